@@ -1,0 +1,2 @@
+//! The `vdf` command line.
+fn main() {}

@@ -1,0 +1,9 @@
+//! The renderer of `vdf`: scenes, media, visibility and integrators.
+
+mod mesh;
+pub mod scene;
+
+pub use mesh::Triangle;
+
+/// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.
+pub type Rgb = glam::Vec3;
