@@ -1,0 +1,167 @@
+//! The filtered test against its exact twin, and the hierarchy against a loop over all triangles.
+
+use glam::{DVec3, Vec3};
+use proptest::prelude::*;
+
+use super::{Bvh, Segment, SegmentTest, intersect_exact};
+use crate::Triangle;
+
+/// Coordinates where tests go wrong: a coarse lattice (shared planes, edges, corners), its neighbours in single precision, −0.0.
+fn coordinate() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        4 => (-4_i8..=4).prop_map(f32::from),
+        2 => (-4_i8..=4).prop_map(|i| f32::from(i).next_up()),
+        2 => (-4_i8..=4).prop_map(|i| f32::from(i).next_down()),
+        1 => Just(-0.0_f32),
+        1 => -4.0_f32..4.0,
+        1 => (-4.0_f32..4.0).prop_map(|x| x * 1e-6),
+    ]
+}
+
+fn point() -> impl Strategy<Value = Vec3> {
+    [coordinate(), coordinate(), coordinate()].prop_map(Vec3::from)
+}
+
+fn triangle() -> impl Strategy<Value = Triangle> {
+    prop_oneof![
+        6 => [point(), point(), point()].prop_map(|[a, b, c]| Triangle::new(a, b, c)),
+        1 => (point(), point()).prop_map(|(a, b)| Triangle::new(a, b, a)),
+        // A sliver: 10⁶ times as long as wide.
+        1 => (point(), point(), -1e-6_f32..1e-6).prop_map(|(a, b, e)| Triangle::new(a, b, (a + b) * 0.5 + e)),
+    ]
+}
+
+/// End points anywhere, or aimed: through a vertex, along an edge, ±1 ulp of double precision.
+fn segment_for(t: Triangle) -> impl Strategy<Value = Segment> {
+    let [a, b, c] = t.vertices_f64();
+    let any = (point(), point()).prop_map(|(p, q)| Segment::new(p.as_dvec3(), q.as_dvec3()));
+    let aimed = (point(), 0..5_u8, -1_i8..=1, 0.5..2.0_f64).prop_map(move |(p, what, ulp, length)| {
+        let target = [a, b, c, (a + b) * 0.5, (a + b + c) / 3.0][usize::from(what)];
+        let nudge = |x: f64| match ulp {
+            0 => x,
+            1 => x.next_up(),
+            _ => x.next_down(),
+        };
+        let target = DVec3::new(nudge(target.x), target.y, nudge(target.z));
+        let p = p.as_dvec3();
+        Segment::new(p, if what == 4 { target } else { p + (target - p) * length })
+    });
+    let edge = (-1.0..2.0_f64, -1.0..2.0_f64).prop_map(move |(s, t)| Segment::new(a + (b - a) * s, a + (b - a) * t));
+    prop_oneof![3 => any, 4 => aimed, 1 => edge]
+}
+
+fn bounds(t: &Triangle) -> (DVec3, DVec3) {
+    let [a, b, c] = t.vertices_f64();
+    (a.min(b).min(c), a.max(b).max(c))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn filter_agrees_with_exact_predicates((t, s) in triangle().prop_flat_map(|t| (Just(t), segment_for(t)))) {
+        let (min, max) = bounds(&t);
+        let fast = SegmentTest::new(s, min, max).intersect(&t);
+        let exact = intersect_exact(&s, &t);
+        prop_assert_eq!(fast.is_some(), exact.is_some(), "{:?} {:?}", s, t);
+        if let Some(hit) = fast {
+            prop_assert!((0.0..=1.0).contains(&hit.t));
+            prop_assert!(hit.barycentric.iter().all(|w| (0.0..=1.0).contains(w)));
+        }
+    }
+
+    #[test]
+    fn a_reversed_segment_has_the_same_answer((t, s) in triangle().prop_flat_map(|t| (Just(t), segment_for(t)))) {
+        let (min, max) = bounds(&t);
+        let hit = |s: Segment| SegmentTest::new(s, min, max).intersect(&t).is_some();
+        prop_assert_eq!(hit(s), hit(Segment::new(s.q, s.p)));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+    #[test]
+    fn hierarchy_agrees_with_a_loop(triangles in prop::collection::vec(triangle(), 0..40), p in point(), q in point(), aim in any::<prop::sample::Index>(), k in 0..3_usize) {
+        let bvh = Bvh::new(&triangles);
+        let mut segments = vec![Segment::new(p.as_dvec3(), q.as_dvec3()), Segment::new(p.as_dvec3() * 1e3, q.as_dvec3())];
+        if !triangles.is_empty() {
+            let target = triangles[aim.index(triangles.len())].vertices_f64()[k];
+            segments.push(Segment::new(p.as_dvec3(), target));
+            segments.push(Segment::new(p.as_dvec3() * 1e3, target));
+        }
+        for s in segments {
+            let first = triangles.iter().filter_map(|t| intersect_exact(&s, t)).map(|h| h.t).min_by(f64::total_cmp);
+            prop_assert_eq!(bvh.occluded(&s), first.is_some());
+            let hit = bvh.intersect(&s);
+            prop_assert_eq!(hit.is_some(), first.is_some());
+            if let (Some(hit), Some(first)) = (hit, first) {
+                prop_assert!((hit.t - first).abs() < 1e-6, "{} {}", hit.t, first);
+            }
+            let mut count = 0;
+            bvh.visit_hits(&s, |_| count += 1);
+            prop_assert_eq!(count, triangles.iter().filter(|t| intersect_exact(&s, t).is_some()).count());
+        }
+    }
+}
+
+/// A closed sphere with displaced vertices: every segment from inside to outside meets it, also through vertices and along edges
+/// (after pbrt's `Triangle.Watertight`).
+#[test]
+fn closed_meshes_are_watertight() {
+    let n = 16_u16;
+    let mut noise = crate::Sampler::new(1, 0, 0, 0);
+    let mut rings: Vec<Vec<Vec3>> = Vec::new();
+    for i in 0..=n {
+        let theta = std::f64::consts::PI * f64::from(i) / f64::from(n);
+        let pole = i == 0 || i == n;
+        let ring: Vec<Vec3> = (0..n)
+            .map(|j| {
+                let phi = std::f64::consts::TAU * f64::from(j) / f64::from(n);
+                let r = if pole { 3.0 } else { 2.0 + noise.next_1d() };
+                (DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()) * r).as_vec3()
+            })
+            .collect();
+        rings.push(if pole { vec![ring[0]; usize::from(n)] } else { ring });
+    }
+    let mut triangles = Vec::new();
+    for i in 0..usize::from(n) {
+        for j in 0..usize::from(n) {
+            let k = (j + 1) % usize::from(n);
+            triangles.push(Triangle::new(rings[i][j], rings[i + 1][j], rings[i + 1][k]));
+            triangles.push(Triangle::new(rings[i][j], rings[i + 1][k], rings[i][k]));
+        }
+    }
+    let bvh = Bvh::new(&triangles);
+    for i in 0..100_000_u32 {
+        let mut u = crate::Sampler::new(2, i, 0, 0);
+        let mut inside = || DVec3::new(u.next_1d(), u.next_1d(), u.next_1d()) - 0.5;
+        let p = inside();
+        let free = p + (inside() - p).normalize() * 10.0;
+        let t = &triangles[i as usize % triangles.len()].vertices_f64();
+        for q in [free, p + (t[0] - p) * 4.0, p + ((t[0] + t[1]) * 0.5 - p) * 4.0] {
+            assert!(bvh.occluded(&Segment::new(p, q)), "{p} {q}");
+        }
+    }
+}
+
+/// The box of a triangle seen from far away, or far from the origin, must not be culled.
+#[test]
+fn hierarchy_finds_hits_far_from_the_origin() {
+    let base = Vec3::new(1e6, -2e6, 3e6);
+    let triangles: Vec<_> = (0..50_u8)
+        .map(|i| {
+            let o = base + Vec3::new(f32::from(i) * 4.0, f32::from(i % 7), 0.0);
+            Triangle::new(o, o + Vec3::X * 2.0, o + Vec3::Y * 2.0)
+        })
+        .collect();
+    let bvh = Bvh::new(&triangles);
+    for t in &triangles {
+        let [a, b, c] = t.vertices_f64();
+        let target = (a + b + c) / 3.0;
+        for from in [target + DVec3::new(0.1, 0.2, 1.0), target + DVec3::new(3e5, -1e5, 7e6), DVec3::ZERO] {
+            assert!(bvh.occluded(&Segment::new(from, target)));
+            assert!(bvh.intersect(&Segment::new(from, target + (target - from) * 0.5)).is_some());
+        }
+    }
+}

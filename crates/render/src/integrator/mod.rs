@@ -1,0 +1,179 @@
+//! The integrators, and what they share: next-event estimation and multiple importance sampling.
+
+mod volpath;
+mod raymarch;
+
+use glam::DVec3;
+
+use crate::{
+    Rgb, Sampler,
+    geometry::Segment,
+    scene::{IntegratorSettings, MediumId, Phase},
+    visibility::{Counters, Proofs, ShadowQuery, Visibility},
+    world::{SurfacePoint, World},
+};
+
+/// One of the integrators, bound to a scene and a method of acceleration.
+#[derive(Debug)]
+pub(crate) struct Integrator<'a, P> {
+    pub(crate) world: &'a World,
+    pub(crate) visibility: Visibility<'a, P>,
+    pub(crate) settings: IntegratorSettings,
+}
+
+/// A ray on its way: from where, whereto, in which medium it starts, and what its light is worth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PathRay {
+    /// From the last event to the farthest point of interest.
+    pub(crate) segment: Segment,
+    /// Unit direction.
+    pub(crate) direction: DVec3,
+    /// The medium at the start.
+    pub(crate) medium: Option<MediumId>,
+}
+
+/// How the last event drew the ray's direction.
+#[derive(Clone, Copy, Debug)]
+enum Origin {
+    /// The camera: no emitter sampling competes.
+    Camera,
+    /// A scattering event at `point` that drew the direction with density `pdf` and also sampled the emitters.
+    Scattering { point: DVec3, pdf: f64 },
+}
+
+/// The end of a path so far, where light may be gathered.
+#[derive(Clone, Copy, Debug)]
+enum Vertex {
+    InMedium { phase: Phase, direction: DVec3 },
+    OnSurface(SurfacePoint),
+}
+
+impl<P: Proofs> Integrator<'_, P> {
+    /// True if a vertex at `depth` scattering events before it may still be followed.
+    #[inline]
+    fn may_scatter(&self, depth: u32) -> bool {
+        self.settings.max_depth.is_none_or(|m| depth < m)
+    }
+
+    /// Next-event estimation where direction sampling may find the same light: weighted by the power heuristic.
+    #[inline]
+    fn direct_light(&self, point: DVec3, vertex: &Vertex, medium: Option<MediumId>, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+        self.emitter_sample(point, vertex, medium, sampler, counters).map_or(Rgb::ZERO, |(value, light_pdf, pdf)| {
+            // A point emitter is found by no scattered ray.
+            if light_pdf > 0.0 { value * to_f32(power_heuristic(light_pdf, pdf)) } else { value }
+        })
+    }
+
+    /// Next-event estimation where it is the only way to find light.
+    #[inline]
+    fn direct_light_alone(&self, point: DVec3, vertex: &Vertex, medium: MediumId, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+        self.emitter_sample(point, vertex, Some(medium), sampler, counters).map_or(Rgb::ZERO, |(value, _, _)| value)
+    }
+
+    /// One emitter sample: the light that arrives, scattered at the vertex, over the density; that density; and the
+    /// density of the vertex's own sampling for this direction.
+    #[inline]
+    fn emitter_sample(
+        &self,
+        point: DVec3,
+        vertex: &Vertex,
+        medium: Option<MediumId>,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Option<(Rgb, f64, f64)> {
+        let (u_emitter, u) = (sampler.next_1d(), sampler.next_2d());
+        let light = self.world.lights.sample(point, u_emitter, u)?;
+        let (value, pdf) = vertex.eval(light.direction);
+        let value = value * light.weight;
+        if value.max_element() <= 0.0 {
+            return None;
+        }
+        let spatial = matches!(vertex, Vertex::InMedium { .. }) && !light.on_surface;
+        let query = ShadowQuery { from: point, to: light.point, emitter: light.emitter, spatial };
+        if !self.visibility.unoccluded(&query, counters) {
+            return None;
+        }
+        let transmittance = self.world.media.transmittance(&Segment::new(point, light.point), medium);
+        Some((value * to_f32(transmittance), light.pdf, pdf))
+    }
+
+    /// Light of the background that a ray meets when it leaves the scene, weighted against emitter sampling.
+    #[inline]
+    fn background(&self, origin: &Origin) -> Rgb {
+        let radiance = self.world.lights.background();
+        match origin {
+            Origin::Scattering { pdf, .. } if radiance != Rgb::ZERO => {
+                radiance * to_f32(power_heuristic(*pdf, self.world.lights.pdf_background()))
+            }
+            _ => radiance,
+        }
+    }
+
+    /// Light emitted by a surface that a ray meets, weighted against emitter sampling.
+    #[inline]
+    fn emitted(&self, surface: &SurfacePoint, direction: DVec3, origin: &Origin) -> Rgb {
+        match (origin, surface.emitter) {
+            (Origin::Scattering { point, pdf }, Some(emitter)) if surface.emitted != Rgb::ZERO => {
+                let cos_theta = -direction.dot(surface.normal);
+                let light_pdf = self.world.lights.pdf_area(emitter, point.distance(surface.point), cos_theta);
+                surface.emitted * to_f32(power_heuristic(*pdf, light_pdf))
+            }
+            _ => surface.emitted,
+        }
+    }
+
+    /// The ray from `point` along `direction`, to beyond the scene.
+    #[inline]
+    fn ray(&self, point: DVec3, direction: DVec3, medium: Option<MediumId>) -> PathRay {
+        let segment = Segment::new(point, point + direction * self.world.lights.reach());
+        PathRay { segment, direction, medium }
+    }
+}
+
+impl Vertex {
+    /// Phase function, or BSDF times cosine, towards `to`; and the density with which direction sampling would draw it.
+    #[inline]
+    fn eval(&self, to: DVec3) -> (Rgb, f64) {
+        match self {
+            Self::InMedium { phase, direction } => {
+                let p = phase.pdf_direction(*direction, to);
+                (Rgb::splat(to_f32(p)), p)
+            }
+            Self::OnSurface(s) => {
+                let pdf = s.normal.dot(to).max(0.0) / std::f64::consts::PI;
+                (s.reflectance * to_f32(pdf), pdf)
+            }
+        }
+    }
+}
+
+/// The weight of a sample drawn with density `pdf` where another strategy has density `other` (power heuristic, β = 2 [Veach1997]).
+#[inline]
+fn power_heuristic(pdf: f64, other: f64) -> f64 {
+    // As a ratio, so that large densities do not overflow; both zero is worth nothing.
+    if pdf == 0.0 {
+        return 0.0;
+    }
+    let r = other / pdf;
+    1.0 / (1.0 + r * r)
+}
+
+#[inline]
+#[allow(clippy::cast_possible_truncation, reason = "radiance is single precision")]
+fn to_f32(x: f64) -> f32 {
+    x as f32
+}
+
+/// Russian roulette as in Mitsuba 3: beyond `rr_depth` a path survives with the probability of its largest throughput, at most 0.95.
+#[inline]
+fn survives(throughput: &mut Rgb, depth: u32, rr_depth: u32, sampler: &mut Sampler) -> bool {
+    if depth <= rr_depth {
+        return true;
+    }
+    let q = throughput.max_element().min(0.95);
+    if sampler.next_1d() >= f64::from(q) {
+        return false;
+    }
+    *throughput /= q;
+    true
+}

@@ -1,0 +1,202 @@
+//! Homogeneous media along a segment: which medium where, transmittance, free flight, strata.
+//!
+//! Medium boundaries never block; they only change the medium. A segment is cut at the boundaries it crosses into intervals of
+//! one medium each, found exactly (see [`crate::geometry`]). At a crossing the medium becomes the boundary's exterior if the
+//! segment leaves along the normal, else its interior. Where several boundaries are crossed at one point, exits come before
+//! entries, so that two media that touch need no reference to each other.
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use crate::{
+    geometry::{Bvh, Segment},
+    scene::{Boundary, Medium, MediumId},
+};
+
+/// The media of a scene and their boundaries, prepared for walks along segments.
+#[derive(Debug)]
+pub struct Media {
+    media: Vec<Medium>,
+    /// Interior and exterior of each boundary.
+    sides: Vec<[Option<MediumId>; 2]>,
+    /// For each boundary: its bounds, and whether it is an axis-aligned box, inside which nothing of it is met.
+    bounds: Vec<(DVec3, DVec3, bool)>,
+    /// Over the triangles of all boundaries.
+    bvh: Bvh,
+    /// For each of these triangles: the boundary it belongs to and its normal (of any length).
+    faces: Vec<(usize, DVec3)>,
+}
+
+/// A part of a segment inside one medium (or in vacuum).
+#[derive(Clone, Copy, Debug)]
+struct Interval {
+    medium: Option<MediumId>,
+    t0: f64,
+    t1: f64,
+}
+
+/// What a free flight along a segment comes to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Flight {
+    /// A collision at parameter `t` in `medium`.
+    Collision {
+        /// Parameter along the segment.
+        t: f64,
+        /// The medium there.
+        medium: MediumId,
+    },
+    /// The end was reached, in this medium.
+    Passed(Option<MediumId>),
+}
+
+impl Media {
+    /// Prepares media and boundaries.
+    #[must_use]
+    pub fn new(media: &[Medium], boundaries: &[Boundary]) -> Self {
+        let bounds = boundaries
+            .iter()
+            .map(|b| {
+                let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+                for v in b.triangles.iter().flat_map(crate::Triangle::vertices_f64) {
+                    min = min.min(v);
+                    max = max.max(v);
+                }
+                // A triangle lies in a face of the bounds if its vertices share an extreme coordinate.
+                let in_a_face = |t: &crate::Triangle| {
+                    let [a, b, c] = t.vertices_f64();
+                    (0..3).any(|k| a[k] == b[k] && b[k] == c[k] && (a[k] == min[k] || a[k] == max[k]))
+                };
+                (min, max, b.triangles.iter().all(in_a_face))
+            })
+            .collect();
+        let triangles: Vec<_> = boundaries.iter().flat_map(|b| b.triangles.iter().copied()).collect();
+        let faces = boundaries.iter().enumerate().flat_map(|(i, b)| b.triangles.iter().map(move |t| (i, t.area_normal())));
+        Self {
+            media: media.to_vec(),
+            sides: boundaries.iter().map(|b| [b.interior, b.exterior]).collect(),
+            bounds,
+            bvh: Bvh::new(&triangles),
+            faces: faces.collect(),
+        }
+    }
+
+    /// The medium with this number.
+    #[inline]
+    #[must_use]
+    pub fn medium(&self, id: MediumId) -> &Medium {
+        &self.media[id.0 as usize]
+    }
+
+    /// exp(−∫σ_t) along the segment, which starts in medium `start` [Houska2013, Sec. 2.1].
+    #[inline]
+    #[must_use]
+    pub fn transmittance(&self, segment: &Segment, start: Option<MediumId>) -> f64 {
+        (-self.optical_depth(segment, start)).exp()
+    }
+
+    /// ∫σ_t along the segment.
+    #[inline]
+    #[must_use]
+    pub fn optical_depth(&self, segment: &Segment, start: Option<MediumId>) -> f64 {
+        let length = segment.length();
+        let mut tau = 0.0;
+        let _ = self.walk(segment, start, |i| {
+            tau += self.depth_of(&i, length);
+            ControlFlow::<()>::Continue(())
+        });
+        tau
+    }
+
+    /// The free flight to optical depth `tau` along the segment: a collision where the depth is reached, if it is.
+    #[inline]
+    #[must_use]
+    pub fn fly(&self, segment: &Segment, start: Option<MediumId>, tau: f64) -> Flight {
+        let length = segment.length();
+        let mut left = tau;
+        let mut last = start;
+        let found = self.walk(segment, start, |i| {
+            last = i.medium;
+            let depth = self.depth_of(&i, length);
+            if let Some(medium) = i.medium
+                && left < depth
+            {
+                let t = i.t0 + left / (self.medium(medium).sigma_t * length);
+                return ControlFlow::Break(Flight::Collision { t: t.min(i.t1), medium });
+            }
+            left -= depth;
+            ControlFlow::Continue(())
+        });
+        match found {
+            ControlFlow::Break(flight) => flight,
+            ControlFlow::Continue(()) => Flight::Passed(last),
+        }
+    }
+
+    #[inline]
+    fn depth_of(&self, i: &Interval, length: f64) -> f64 {
+        i.medium.map_or(0.0, |m| self.medium(m).sigma_t * ((i.t1 - i.t0) * length))
+    }
+
+    /// Visits the intervals of the segment in order, until the visitor breaks.
+    #[inline]
+    fn walk<B>(
+        &self,
+        segment: &Segment,
+        start: Option<MediumId>,
+        mut visit: impl FnMut(Interval) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        if self.crosses_nothing(segment) {
+            return visit(Interval { medium: start, t0: 0.0, t1: 1.0 });
+        }
+        let (mut medium, mut t0) = (start, 0.0);
+        let mut passed = None;
+        while let Some(crossing) = self.next_crossing(segment, passed) {
+            visit(Interval { medium, t0, t1: crossing.t })?;
+            let [interior, exterior] = self.sides[crossing.boundary];
+            medium = if crossing.enters { interior } else { exterior };
+            t0 = crossing.t;
+            passed = Some(crossing);
+        }
+        visit(Interval { medium, t0, t1: 1.0 })
+    }
+
+    /// True only if no boundary is met: the cheap proof for the usual case of a path inside one box of fog.
+    #[inline]
+    fn crosses_nothing(&self, segment: &Segment) -> bool {
+        let (low, high) = (segment.p.min(segment.q), segment.p.max(segment.q));
+        self.bounds.iter().all(|&(min, max, is_box)| {
+            (is_box && low.cmpgt(min).all() && high.cmplt(max).all()) || low.cmpgt(max).any() || high.cmplt(min).any()
+        })
+    }
+
+    /// The first crossing after `passed` in the order of crossings.
+    fn next_crossing(&self, segment: &Segment, passed: Option<Crossing>) -> Option<Crossing> {
+        let d = segment.q - segment.p;
+        let mut next: Option<Crossing> = None;
+        self.bvh.visit_hits(segment, |hit| {
+            let (boundary, normal) = self.faces[hit.triangle as usize];
+            let crossing = Crossing { t: hit.t, enters: normal.dot(d) < 0.0, boundary };
+            if passed.is_none_or(|p| p.precedes(&crossing)) && next.is_none_or(|n| crossing.precedes(&n)) {
+                next = Some(crossing);
+            }
+        });
+        next
+    }
+}
+
+/// Where a segment crosses a boundary.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    t: f64,
+    enters: bool,
+    boundary: usize,
+}
+
+impl Crossing {
+    /// The strict order along the segment: by place, exits before entries, then by number. Two triangles of one boundary that are
+    /// met on their common edge are one crossing.
+    fn precedes(&self, other: &Self) -> bool {
+        (self.t, self.enters, self.boundary) < (other.t, other.enters, other.boundary)
+    }
+}

@@ -1,0 +1,157 @@
+//! Visibility: the one place that knows the acceleration method, the hierarchy and the counters. Integrators ask it and nothing else.
+//!
+//! A query is answered by the method's proof if it has one, else by the hierarchy. A proof is a statement about the exact
+//! geometry, and the hierarchy's answer is exact, so the answer is the same with every method.
+
+use glam::DVec3;
+use vdf_distfield::{SafeNeighbourhood, SafeZones};
+use vdf_voxel::{Span, VoxelGrid};
+
+use crate::geometry::{Bvh, Hit, Segment};
+
+/// What a method knows of a segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// Proved: no occluder meets the closed segment.
+    Unoccluded,
+    /// Proved: an occluder meets it. None of the thesis's methods ever says so.
+    Occluded,
+    /// No proof either way.
+    Unknown,
+}
+
+/// A method of acceleration: proofs about segments towards emitters.
+pub trait Proofs: Sync {
+    /// What is known about the closed segment `from`–`to`, where `to` is a sampled point of emitter `emitter`.
+    fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer;
+}
+
+/// The method `none`: every query goes to the hierarchy.
+#[derive(Clone, Copy, Debug)]
+pub struct NoProofs;
+
+impl Proofs for NoProofs {
+    #[inline]
+    fn answer(&self, _: usize, _: DVec3, _: DVec3) -> Answer {
+        Answer::Unknown
+    }
+}
+
+/// The methods `ndf` and `amr`: one of the end points' voxels lies in the safe zone of the other's.
+#[derive(Debug)]
+pub struct FieldProofs<F> {
+    /// The grid of the field.
+    pub grid: VoxelGrid,
+    /// The field.
+    pub field: F,
+}
+
+impl<F: SafeZones> Proofs for FieldProofs<F> {
+    #[inline]
+    fn answer(&self, _: usize, from: DVec3, to: DVec3) -> Answer {
+        let proved = match self.grid.voxel_span(from, to) {
+            Span::Inside(a, b) => self.field.proves(a, b),
+            // The grid covers all occluders.
+            Span::Outside => true,
+        };
+        if proved { Answer::Unoccluded } else { Answer::Unknown }
+    }
+}
+
+/// The methods `-sn`: for each point emitter one bit a voxel (Def. 14 in [Houska2013]); other emitters ask the field.
+#[derive(Debug)]
+pub struct NeighbourhoodProofs<F> {
+    /// The field and its grid.
+    pub base: FieldProofs<F>,
+    /// For each emitter its neighbourhood, if it is a point inside the grid.
+    pub neighbourhoods: Vec<Option<SafeNeighbourhood>>,
+}
+
+impl<F: SafeZones> Proofs for NeighbourhoodProofs<F> {
+    #[inline]
+    fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+        match (&self.neighbourhoods[emitter], self.base.grid.voxel_containing(from)) {
+            (Some(neighbourhood), Some(voxel)) => {
+                if neighbourhood.proves(voxel) { Answer::Unoccluded } else { Answer::Unknown }
+            }
+            _ => self.base.answer(emitter, from, to),
+        }
+    }
+}
+
+/// A question for [`Visibility::unoccluded`].
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowQuery {
+    /// Where light would arrive.
+    pub from: DVec3,
+    /// The sampled point on the emitter.
+    pub to: DVec3,
+    /// Number of the emitter.
+    pub emitter: usize,
+    /// Whether neither end lies on an occluder (Def. 2 in [Houska2013]); only such queries can be proved.
+    pub spatial: bool,
+}
+
+/// How many queries were asked and how they were answered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Visibility queries, N.
+    pub queries: u64,
+    /// Those that were spatial.
+    pub spatial: u64,
+    /// Those of the spatial ones that a proof answered.
+    pub proved: u64,
+    /// Camera paths.
+    pub paths: u64,
+    /// Paths whose radiance was not finite or negative and was therefore left out. Must be 0.
+    pub refused: u64,
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.queries += other.queries;
+        self.spatial += other.spatial;
+        self.proved += other.proved;
+        self.paths += other.paths;
+        self.refused += other.refused;
+    }
+}
+
+/// Answers all visibility questions of an integrator.
+#[derive(Debug)]
+pub struct Visibility<'a, P> {
+    bvh: &'a Bvh,
+    proofs: &'a P,
+}
+
+impl<'a, P: Proofs> Visibility<'a, P> {
+    /// Asks `proofs` first and `bvh` for the rest; both about the same occluders.
+    #[must_use]
+    pub const fn new(bvh: &'a Bvh, proofs: &'a P) -> Self {
+        Self { bvh, proofs }
+    }
+
+    /// The first occluder along the segment.
+    #[inline]
+    #[must_use]
+    pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
+        self.bvh.intersect(segment)
+    }
+
+    /// Whether the closed segment of the query meets no occluder.
+    #[inline]
+    pub fn unoccluded(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
+        counters.queries += 1;
+        if query.spatial {
+            counters.spatial += 1;
+            match self.proofs.answer(query.emitter, query.from, query.to) {
+                Answer::Unknown => {}
+                answer => {
+                    counters.proved += 1;
+                    return answer == Answer::Unoccluded;
+                }
+            }
+        }
+        !self.bvh.occluded(&Segment::new(query.from, query.to))
+    }
+}
