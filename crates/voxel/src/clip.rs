@@ -1,0 +1,98 @@
+//! The voxels of a segment's two ends, where an end may be outside the grid.
+
+use glam::DVec3;
+
+use crate::{Voxel, VoxelGrid};
+
+/// The part of a segment that is inside a grid, as the voxels of its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Span {
+    /// All of the segment that is inside the grid lies in the cuboid spanned by these two voxels, dilated by the
+    /// budget of [`VoxelGrid::dilation`].
+    Inside(Voxel, Voxel),
+    /// The segment does not touch the grid.
+    Outside,
+}
+
+impl VoxelGrid {
+    /// The voxels of the ends of the segment from `a` to `b`; an end outside the grid moves along the segment to where
+    /// that enters the grid. Reversing the segment swaps the voxels and changes nothing else.
+    ///
+    /// A coordinate that is not finite gives the two opposite corners of the grid: the span about which least can be
+    /// proved.
+    ///
+    /// # Error of clipping
+    /// An emitter may be very far away, and rounding errors grow with its distance: no fixed dilation of the occluders
+    /// could cover them. So clipping is rounded outwards instead. With u = 2⁻⁵³ and G the largest of 1, the
+    /// resolution and the grid coordinates of the ends, let m = 128u·G.
+    /// - Computed coordinates P(τ) = a + τ·(b − a), τ in \[0, 1\], are within 16u·G of the true ones: 4u·G for a, the
+    ///   same for b, which with its own rounding gives 10u·G for b − a, and 2u·G for the evaluation.
+    /// - The segment is clipped to the grid dilated by m. A point of the true segment that is inside the grid has a τ
+    ///   at which the computed one is inside the dilated slab by at least 112u·G. The bounds of τ for that slab carry three
+    ///   roundings, less than 8u·G in position. So no such τ is ever clipped away, and `Outside` is certain.
+    /// - Each clipped end then moves by m away from the other end, on every axis. So the spanned cuboid contains the
+    ///   true part of the segment without the help of the dilation.
+    #[must_use]
+    #[inline]
+    pub fn voxel_span(&self, a: DVec3, b: DVec3) -> Span {
+        match (self.voxel_containing(a), self.voxel_containing(b)) {
+            (Some(a), Some(b)) => Span::Inside(a, b),
+            _ => self.clipped_span(a, b),
+        }
+    }
+
+    #[inline(never)]
+    fn clipped_span(&self, a: DVec3, b: DVec3) -> Span {
+        // One direction only, so that both directions round alike.
+        if b.to_array() < a.to_array() {
+            return match self.span_in_order(b, a) {
+                Span::Inside(b, a) => Span::Inside(a, b),
+                Span::Outside => Span::Outside,
+            };
+        }
+        self.span_in_order(a, b)
+    }
+
+    fn span_in_order(&self, a: DVec3, b: DVec3) -> Span {
+        let resolution = self.resolution();
+        let box_max = DVec3::new(resolution.x.into(), resolution.y.into(), resolution.z.into());
+        let (ga, gb) = (self.grid_coordinates(a), self.grid_coordinates(b));
+        let reach = ga.abs().max(gb.abs()).max(box_max).max_element();
+        // `max` drops NaN, so both ends are asked as well.
+        if !(ga.is_finite() && gb.is_finite() && reach < 1e200) {
+            return Span::Inside(Voxel::new(0, 0, 0), resolution.last());
+        }
+        let margin = 64.0 * f64::EPSILON * reach;
+        let d = gb - ga;
+
+        let (mut enter, mut leave) = (0.0f64, 1.0f64);
+        for axis in 0..3 {
+            let (low, high) = (-margin - ga[axis], box_max[axis] + margin - ga[axis]);
+            if d[axis] == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return Span::Outside;
+                }
+                continue;
+            }
+            let (t0, t1) = (low / d[axis], high / d[axis]);
+            enter = enter.max(t0.min(t1));
+            leave = leave.min(t0.max(t1));
+        }
+        if enter > leave {
+            return Span::Outside;
+        }
+
+        let (pa, pb) = (ga + d * enter, ga + d * leave);
+        let (mut from, mut to) = (pa, pb);
+        for axis in 0..3 {
+            let outwards = if pa[axis] <= pb[axis] { margin } else { -margin };
+            from[axis] -= outwards;
+            to[axis] += outwards;
+        }
+        // Truncation clamps to the grid: conversion of negative numbers gives 0.
+        Span::Inside(self.truncated(from), self.truncated(to))
+    }
+}
+
+#[cfg(test)]
+mod tests;
