@@ -2,12 +2,13 @@
 //!
 //! Medium boundaries never block; they only change the medium. A segment is cut at the boundaries it crosses into intervals of
 //! one medium each, found exactly (see [`crate::geometry`]). At a crossing the medium becomes the boundary's exterior if the
-//! segment leaves along the normal, else its interior. Where several boundaries are crossed at one point, exits come before
-//! entries, so that two media that touch need no reference to each other.
+//! segment leaves along the normal, else its interior. Where several boundaries are crossed at one place, exits come before
+//! entries, so that two media that touch need no reference to each other; places closer than the rounding of a hit are one.
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 use crate::{
     geometry::{Bvh, Segment},
@@ -26,6 +27,9 @@ pub struct Media {
     bvh: Bvh,
     /// For each of these triangles: the boundary it belongs to and its normal (of any length).
     faces: Vec<(usize, DVec3)>,
+    /// Crossings closer than this are at one place, in world units: 2⁻⁴⁰ of the largest coordinate, far more than the rounding of `t`
+    /// and far less than a single-precision vertex can express.
+    one_place: f64,
 }
 
 /// A part of a segment inside one medium (or in vacuum).
@@ -71,13 +75,16 @@ impl Media {
             })
             .collect();
         let triangles: Vec<_> = boundaries.iter().flat_map(|b| b.triangles.iter().copied()).collect();
+        let bvh = Bvh::new(&triangles);
+        let largest = bvh.bounds().map_or(0.0, |(min, max)| min.abs().max(max.abs()).max_element());
         let faces = boundaries.iter().enumerate().flat_map(|(i, b)| b.triangles.iter().map(move |t| (i, t.area_normal())));
         Self {
             media: media.to_vec(),
             sides: boundaries.iter().map(|b| [b.interior, b.exterior]).collect(),
             bounds,
-            bvh: Bvh::new(&triangles),
+            bvh,
             faces: faces.collect(),
+            one_place: largest / (1_u64 << 40) as f64,
         }
     }
 
@@ -150,13 +157,11 @@ impl Media {
             return visit(Interval { medium: start, t0: 0.0, t1: 1.0 });
         }
         let (mut medium, mut t0) = (start, 0.0);
-        let mut passed = None;
-        while let Some(crossing) = self.next_crossing(segment, passed) {
+        for crossing in self.crossings(segment) {
             visit(Interval { medium, t0, t1: crossing.t })?;
             let [interior, exterior] = self.sides[crossing.boundary];
             medium = if crossing.enters { interior } else { exterior };
             t0 = crossing.t;
-            passed = Some(crossing);
         }
         visit(Interval { medium, t0, t1: 1.0 })
     }
@@ -170,22 +175,28 @@ impl Media {
         })
     }
 
-    /// The first crossing after `passed` in the order of crossings.
-    fn next_crossing(&self, segment: &Segment, passed: Option<Crossing>) -> Option<Crossing> {
+    /// All crossings in the order in which they take effect.
+    fn crossings(&self, segment: &Segment) -> Crossings {
         let d = segment.q - segment.p;
-        let mut next: Option<Crossing> = None;
+        let mut crossings = Crossings::new();
         self.bvh.visit_hits(segment, |hit| {
             let (boundary, normal) = self.faces[hit.triangle as usize];
-            let crossing = Crossing { t: hit.t, enters: normal.dot(d) < 0.0, boundary };
-            if passed.is_none_or(|p| p.precedes(&crossing)) && next.is_none_or(|n| crossing.precedes(&n)) {
-                next = Some(crossing);
-            }
+            crossings.push(Crossing { t: hit.t, enters: normal.dot(d) < 0.0, boundary });
         });
-        next
+        crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.boundary.cmp(&b.boundary)));
+        let one_place = self.one_place / d.length();
+        for place in crossings.chunk_by_mut(|a, b| b.t - a.t <= one_place) {
+            place.sort_unstable_by_key(|c| (c.enters, c.boundary));
+            // Within a place the order is what counts; a common `t` keeps the intervals in order.
+            let t = place[0].t;
+            place.iter_mut().for_each(|c| c.t = t);
+        }
+        crossings
     }
 }
 
-/// Where a segment crosses a boundary.
+/// Where a segment crosses a boundary. Two triangles of one boundary that are met on their common edge give two crossings of the same
+/// effect, which is that of one.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     t: f64,
@@ -193,10 +204,5 @@ struct Crossing {
     boundary: usize,
 }
 
-impl Crossing {
-    /// The strict order along the segment: by place, exits before entries, then by number. Two triangles of one boundary that are
-    /// met on their common edge are one crossing.
-    fn precedes(&self, other: &Self) -> bool {
-        (self.t, self.enters, self.boundary) < (other.t, other.enters, other.boundary)
-    }
-}
+/// On the stack for all but pathological segments: no allocation in the loops of the integrators.
+type Crossings = SmallVec<[Crossing; 16]>;

@@ -1,0 +1,168 @@
+//! A whole render: prepare, build, then tile by tile over all threads.
+//!
+//! Every pixel is the mean of its own samples, summed in the order of their numbers, and every random number is a function of (seed, pixel,
+//! sample, dimension). So the image does not depend on threads, tiles, crop or method.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::{
+    Acceleration, Image, IntegratorKind, Progress, RenderError, RenderOptions, Rendering, Rgb, Sampler, World,
+    integrator::{Integrator, PathRay},
+    scene::{PixelRect, Scene},
+    visibility::{Counters, Proofs, Visibility},
+};
+
+/// Side of a tile in pixels. Only progress and cancellation see tiles.
+const TILE: u32 = 16;
+
+/// Renders `scene`.
+///
+/// # Errors
+/// If an option or the voxel size is not usable, or `progress` asks to stop.
+pub fn render(scene: &Scene, options: &RenderOptions, progress: &dyn Progress) -> Result<Rendering, RenderError> {
+    options.validate(scene)?;
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = options.threads {
+        pool = pool.num_threads(threads);
+    }
+    let pool = pool.build().map_err(|e| RenderError::Threads { message: e.to_string() })?;
+    pool.install(|| render_in_pool(scene, options, progress))
+}
+
+fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progress) -> Result<Rendering, RenderError> {
+    progress.phase("hierarchy");
+    let start = Instant::now();
+    let world = World::new(scene);
+    let bvh_seconds = start.elapsed().as_secs_f64();
+
+    progress.phase("distance field");
+    let voxel_size = options.voxel_size.unwrap_or_else(|| {
+        let extent = (world.bounds.1 - world.bounds.0).max_element();
+        // A scene of one point has no extent; any size covers it with one voxel.
+        if extent > 0.0 { extent / 128.0 } else { 1.0 }
+    });
+    let (acceleration, build) = Acceleration::build(
+        options.method,
+        &world.triangles,
+        world.bounds,
+        &scene.emitters,
+        voxel_size,
+        options.max_voxels,
+    )?;
+
+    progress.phase("rendering");
+    let start = Instant::now();
+    let job = Job {
+        scene,
+        world: &world,
+        kind: options.integrator,
+        crop: options.crop.unwrap_or(scene.film.crop),
+        spp: options.spp.unwrap_or(scene.sample_count),
+        seed: options.seed.unwrap_or(scene.seed),
+    };
+    let (pixels, counters) = match &acceleration {
+        Acceleration::None(p) => job.run(p, progress),
+        Acceleration::Ndf(p) => job.run(p, progress),
+        Acceleration::Amr(p) => job.run(p, progress),
+        Acceleration::NdfSn(p) => job.run(p, progress),
+        Acceleration::AmrSn(p) => job.run(p, progress),
+    }?;
+    let render_seconds = start.elapsed().as_secs_f64();
+    let (width, height) = job.size();
+    let image = Image { width, height, pixels };
+    let statistics = crate::Statistics::new(scene, options, &build, &counters, bvh_seconds, render_seconds);
+    Ok(Rendering { image, statistics })
+}
+
+/// What to render, with all options resolved.
+struct Job<'a> {
+    scene: &'a Scene,
+    world: &'a World,
+    kind: IntegratorKind,
+    crop: PixelRect,
+    spp: u32,
+    seed: u64,
+}
+
+impl Job<'_> {
+    fn size(&self) -> (u32, u32) {
+        (self.crop.x1 - self.crop.x0, self.crop.y1 - self.crop.y0)
+    }
+
+    /// Renders all tiles; generic in the method, so that the dispatch stays out of the loops.
+    fn run<P: Proofs>(&self, proofs: &P, progress: &dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
+        let (width, height) = self.size();
+        progress.pixels_total(u64::from(width) * u64::from(height));
+        let tiles: Vec<PixelRect> = (self.crop.y0..self.crop.y1)
+            .step_by(TILE as usize)
+            .flat_map(|y0| (self.crop.x0..self.crop.x1).step_by(TILE as usize).map(move |x0| (x0, y0)))
+            .map(|(x0, y0)| PixelRect { x0, y0, x1: (x0 + TILE).min(self.crop.x1), y1: (y0 + TILE).min(self.crop.y1) })
+            .collect();
+        let rendered: Vec<_> = tiles
+            .par_iter()
+            .map(|tile| {
+                if progress.cancelled() {
+                    return Err(RenderError::Cancelled);
+                }
+                let result = self.tile(proofs, *tile);
+                progress.pixels_done(result.0.len() as u64);
+                Ok(result)
+            })
+            .collect::<Result<_, _>>()?;
+
+        let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
+        let mut counters = Counters::default();
+        for (tile, (tile_pixels, tile_counters)) in tiles.iter().zip(rendered) {
+            counters += tile_counters;
+            let row = (tile.x1 - tile.x0) as usize;
+            for (y, line) in (tile.y0..).zip(tile_pixels.chunks_exact(row)) {
+                let first = (y - self.crop.y0) as usize * width as usize + (tile.x0 - self.crop.x0) as usize;
+                pixels[first..first + row].copy_from_slice(line);
+            }
+        }
+        Ok((pixels, counters))
+    }
+
+    fn tile<P: Proofs>(&self, proofs: &P, tile: PixelRect) -> (Vec<Rgb>, Counters) {
+        let integrator = Integrator {
+            world: self.world,
+            visibility: Visibility::new(&self.world.bvh, proofs),
+            settings: self.scene.integrator,
+        };
+        let mut counters = Counters::default();
+        let pixels = (tile.y0..tile.y1)
+            .flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let mut sum = glam::DVec3::ZERO;
+                for sample in 0..self.spp {
+                    let radiance = self.sample(&integrator, x, y, sample, &mut counters);
+                    counters.paths += 1;
+                    if radiance.is_finite() && radiance.min_element() >= 0.0 {
+                        sum += radiance.as_dvec3();
+                    } else {
+                        counters.refused += 1;
+                    }
+                }
+                (sum / f64::from(self.spp)).as_vec3()
+            })
+            .collect();
+        (pixels, counters)
+    }
+
+    #[inline]
+    fn sample<P: Proofs>(&self, integrator: &Integrator<'_, P>, x: u32, y: u32, sample: u32, counters: &mut Counters) -> Rgb {
+        let mut sampler = Sampler::new(self.seed, x, y, sample);
+        let film = &self.scene.film;
+        let [dx, dy] = film.filter.sample(&mut sampler);
+        let (segment, direction) = self.scene.sensor.ray(film, f64::from(x) + dx, f64::from(y) + dy);
+        let ray = PathRay { segment, direction, medium: self.scene.sensor.medium };
+        match self.kind {
+            IntegratorKind::Volpath => integrator.volpath(ray, &mut sampler, counters),
+            IntegratorKind::Raymarch { samples_per_segment } => {
+                integrator.raymarch(ray, samples_per_segment, &mut sampler, counters)
+            }
+        }
+    }
+}

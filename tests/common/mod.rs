@@ -1,0 +1,143 @@
+//! What the end-to-end tests share: scenes made in code and a quiet way to render them.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use vdf::render::{
+    IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, Triangle, render,
+    scene::{
+        Boundary, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
+        ReconstructionFilter, Scene,
+    },
+};
+
+use glam::{DMat4, DVec3, Vec3, vec3};
+
+/// Reports nothing and never stops.
+pub struct Quiet;
+
+impl Progress for Quiet {
+    fn phase(&self, _: &str) {}
+    fn pixels_total(&self, _: u64) {}
+    fn pixels_done(&self, _: u64) {}
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// `volpath` without acceleration; the tests change what they are about.
+pub fn options() -> RenderOptions {
+    RenderOptions {
+        method: Method::None,
+        voxel_size: None,
+        integrator: IntegratorKind::Volpath,
+        spp: None,
+        seed: None,
+        threads: Some(2),
+        crop: None,
+        max_voxels: 1 << 30,
+    }
+}
+
+/// Renders and requires that no sample was refused.
+pub fn rendered(scene: &Scene, options: &RenderOptions) -> Rendering {
+    let rendering = render(scene, options, &Quiet).expect("the scene is sound");
+    assert_eq!(rendering.statistics.refused, 0, "non-finite or negative samples");
+    rendering
+}
+
+/// An empty scene: the camera at the origin looks along +Z with a field of view of `tan_half_fov`.
+pub fn empty_scene(size: u32, spp: u32, tan_half_fov: f64) -> Scene {
+    Scene {
+        surfaces: vec![],
+        boundaries: vec![],
+        media: vec![],
+        emitters: vec![],
+        sensor: PerspectiveSensor {
+            world_from_camera: DMat4::IDENTITY,
+            tan_half_fov_x: tan_half_fov,
+            near_clip: 1e-9,
+            far_clip: 1e6,
+            medium: None,
+        },
+        film: FilmSettings {
+            width: size,
+            height: size,
+            crop: PixelRect { x0: 0, y0: 0, x1: size, y1: size },
+            filter: ReconstructionFilter::Box,
+        },
+        integrator: IntegratorSettings { max_depth: None, rr_depth: 5 },
+        sample_count: spp,
+        seed: 1,
+        warnings: vec![],
+    }
+}
+
+/// Adds a medium and returns its number.
+pub fn add_medium(scene: &mut Scene, sigma_t: f64, albedo: f32, phase: Phase) -> MediumId {
+    scene.media.push(Medium { sigma_t, albedo: Rgb::splat(albedo), phase });
+    MediumId(u32::try_from(scene.media.len()).expect("few") - 1)
+}
+
+/// The box from `min` to `max`, normals outwards.
+pub fn cuboid(min: Vec3, max: Vec3) -> Vec<Triangle> {
+    let corner = |i: u8| {
+        vec3(
+            if i & 1 == 0 { min.x } else { max.x },
+            if i & 2 == 0 { min.y } else { max.y },
+            if i & 4 == 0 { min.z } else { max.z },
+        )
+    };
+    [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+        .iter()
+        .flat_map(|&[a, b, c, d]| {
+            let [a, b, c, d] = [a, b, c, d].map(corner);
+            [Triangle::new(a, b, c), Triangle::new(a, c, d)]
+        })
+        .collect()
+}
+
+/// Fills the box from `min` to `max` with a medium, vacuum outside.
+pub fn add_fog(scene: &mut Scene, min: Vec3, max: Vec3, medium: MediumId) {
+    scene.boundaries.push(Boundary { triangles: cuboid(min, max), interior: Some(medium), exterior: None });
+}
+
+/// Mean and standard error of the first channel over all pixels, which must share one expectation.
+pub fn mean_and_error(pixels: &[Rgb]) -> (f64, f64) {
+    let n = pixels.len() as f64;
+    let mean = pixels.iter().map(|p| f64::from(p.x)).sum::<f64>() / n;
+    let variance = pixels.iter().map(|p| (f64::from(p.x) - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// ∫ f over [a, b] by adaptive Simpson's rule to a relative tolerance of about 10⁻⁹.
+pub fn integrate(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    fn simpson(fa: f64, fm: f64, fb: f64, h: f64) -> f64 {
+        h / 6.0 * (fa + 4.0 * fm + fb)
+    }
+    #[allow(clippy::too_many_arguments, reason = "the values of the whole interval are passed down")]
+    fn refine(f: &dyn Fn(f64) -> f64, a: f64, b: f64, fa: f64, fm: f64, fb: f64, whole: f64, tol: f64, depth: u32) -> f64 {
+        let m = 0.5 * (a + b);
+        let (fl, fr) = (f(0.5 * (a + m)), f(0.5 * (m + b)));
+        let (left, right) = (simpson(fa, fl, fm, m - a), simpson(fm, fr, fb, b - m));
+        let delta = left + right - whole;
+        if depth == 0 || delta.abs() <= 15.0 * tol {
+            return left + right + delta / 15.0;
+        }
+        refine(f, a, m, fa, fl, fm, left, 0.5 * tol, depth - 1) + refine(f, m, b, fm, fr, fb, right, 0.5 * tol, depth - 1)
+    }
+    // Pieces first, so that a narrow peak is not overlooked.
+    let pieces = 256;
+    let h = (b - a) / f64::from(pieces);
+    let rough: f64 = (0..pieces).map(|i| f(a + (f64::from(i) + 0.5) * h) * h).sum::<f64>().abs();
+    (0..pieces)
+        .map(|i| {
+            let (a, b) = (a + f64::from(i) * h, a + f64::from(i + 1) * h);
+            let (fa, fm, fb) = (f(a), f(0.5 * (a + b)), f(b));
+            refine(f, a, b, fa, fm, fb, simpson(fa, fm, fb, b - a), 1e-10 * rough / f64::from(pieces), 40)
+        })
+        .sum()
+}
+
+/// The camera's position.
+pub fn eye(scene: &Scene) -> DVec3 {
+    scene.sensor.world_from_camera.w_axis.truncate()
+}
