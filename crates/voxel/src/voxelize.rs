@@ -77,7 +77,7 @@ fn add_triangle(
 fn touched(low: f64, high: f64, limit: u32) -> Option<RangeInclusive<u32>> {
     let first = (low - 1.0).ceil().max(0.0);
     let last = high.floor().min(f64::from(limit) - 1.0);
-    (first <= last).then(|| first as u32..=last as u32)
+    (first <= last).then_some(first as u32..=last as u32)
 }
 
 /// Tests the voxels of a box around the triangle, column by column.
