@@ -38,11 +38,17 @@ where
     T: IntoParallelIterator<Item = [Vec3; 3]>,
 {
     let bits = AtomicBits::new(grid.resolution());
-    triangles.into_par_iter().try_for_each(|triangle| add_triangle(grid, &bits, triangle))?;
+    triangles
+        .into_par_iter()
+        .try_for_each(|triangle| add_triangle(grid, &bits, triangle))?;
     Ok(bits.into_set())
 }
 
-fn add_triangle(grid: &VoxelGrid, bits: &AtomicBits, triangle: [Vec3; 3]) -> Result<(), VoxelError> {
+fn add_triangle(
+    grid: &VoxelGrid,
+    bits: &AtomicBits,
+    triangle: [Vec3; 3],
+) -> Result<(), VoxelError> {
     if !triangle.iter().all(|v| v.is_finite()) {
         return Err(VoxelError::NonFiniteTriangle);
     }
@@ -71,11 +77,16 @@ fn add_triangle(grid: &VoxelGrid, bits: &AtomicBits, triangle: [Vec3; 3]) -> Res
 fn touched(low: f64, high: f64, limit: u32) -> Option<RangeInclusive<u32>> {
     let first = (low - 1.0).ceil().max(0.0);
     let last = high.floor().min(f64::from(limit) - 1.0);
-    (first <= last).then(|| first as u32..=last as u32)
+    (first <= last).then_some(first as u32..=last as u32)
 }
 
 /// Tests the voxels of a box around the triangle, column by column.
-fn scan(bits: &AtomicBits, vertices: &[DVec3; 3], bounds: &[RangeInclusive<u32>; 3], dilation: f64) {
+fn scan(
+    bits: &AtomicBits,
+    vertices: &[DVec3; 3],
+    bounds: &[RangeInclusive<u32>; 3],
+    dilation: f64,
+) {
     let radius = 0.5 + dilation;
     let slab = Slab::new(vertices, radius);
     let w = slab.axis;
@@ -93,8 +104,12 @@ fn scan(bits: &AtomicBits, vertices: &[DVec3; 3], bounds: &[RangeInclusive<u32>;
             }
             let (near, far) = slab.depths(x, y);
             // From centres to indices; 4δ covers the rounding of the depths.
-            let first = (near - 0.5 - 4.0 * dilation).ceil().max(f64::from(*bounds[w].start()));
-            let last = (far - 0.5 + 4.0 * dilation).floor().min(f64::from(*bounds[w].end()));
+            let first = (near - 0.5 - 4.0 * dilation)
+                .ceil()
+                .max(f64::from(*bounds[w].start()));
+            let last = (far - 0.5 + 4.0 * dilation)
+                .floor()
+                .min(f64::from(*bounds[w].end()));
             if first > last {
                 continue;
             }
@@ -121,7 +136,13 @@ impl AtomicBits {
     fn new(resolution: Resolution) -> Self {
         let words_per_row = words_per_row(resolution);
         let count = words_per_row * resolution.y as usize * resolution.z as usize;
-        Self { resolution, words_per_row, words: std::iter::repeat_with(AtomicU64::default).take(count).collect() }
+        Self {
+            resolution,
+            words_per_row,
+            words: std::iter::repeat_with(AtomicU64::default)
+                .take(count)
+                .collect(),
+        }
     }
 
     #[inline]
@@ -135,7 +156,10 @@ impl AtomicBits {
     }
 
     fn into_set(self) -> VoxelSet {
-        VoxelSet::from_words(self.resolution, self.words.into_iter().map(AtomicU64::into_inner).collect())
+        VoxelSet::from_words(
+            self.resolution,
+            self.words.into_iter().map(AtomicU64::into_inner).collect(),
+        )
     }
 }
 

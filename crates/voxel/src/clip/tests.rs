@@ -1,1 +1,120 @@
+use proptest::prelude::*;
+
 use super::*;
+use crate::Resolution;
+
+fn grid() -> VoxelGrid {
+    VoxelGrid::covering(DVec3::ZERO, DVec3::new(30.0, 21.0, 12.0), 3.0, 1 << 20)
+        .expect("a legal grid")
+}
+
+fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+#[test]
+fn ends_inside_keep_their_voxels() {
+    let span = grid().voxel_span(v(1.0, 1.0, 1.0), v(29.0, 20.0, 11.0));
+    assert_eq!(span, Span::Inside(Voxel::new(0, 0, 0), Voxel::new(9, 6, 3)));
+}
+
+#[test]
+fn ends_outside_move_to_the_border() {
+    let span = grid().voxel_span(v(-1e4, 10.0, 4.0), v(14.0, 10.0, 4.0));
+    // The ends are rounded outwards, and at x = 0 there is no more outside.
+    assert_eq!(span, Span::Inside(Voxel::new(0, 3, 1), Voxel::new(4, 3, 1)));
+    let through = grid().voxel_span(v(10.0, -50.0, 4.0), v(10.0, 50.0, 4.0));
+    assert_eq!(
+        through,
+        Span::Inside(Voxel::new(3, 0, 1), Voxel::new(3, 6, 1))
+    );
+}
+
+#[test]
+fn segments_that_miss_are_outside() {
+    for (a, b) in [
+        (v(-1.0, 10.0, 4.0), v(-1e-6, 11.0, 4.0)),
+        (v(-5.0, 3.0, 4.0), v(3.0, -5.1, 4.0)),
+        (v(1e12, 1.0, 1.0), v(1e12, 2.0, 1.0)),
+        (v(31.0, 5.0, 5.0), v(31.0, 5.0, 5.0)),
+    ] {
+        assert_eq!(grid().voxel_span(a, b), Span::Outside, "{a} {b}");
+    }
+}
+
+#[test]
+fn touching_the_grid_is_not_outside() {
+    // Through a corner, along a face, and up to a face.
+    for (a, b) in [
+        (v(-5.0, 5.0, 0.0), v(5.0, -5.0, 0.0)),
+        (v(-5.0, 21.0, 12.0), v(50.0, 21.0, 12.0)),
+        (v(30.0, 5.0, 5.0), v(31.0, 5.0, 5.0)),
+        (v(-1.0, -1.0, -1.0), v(0.0, 0.0, 0.0)),
+    ] {
+        assert_ne!(grid().voxel_span(a, b), Span::Outside, "{a} {b}");
+    }
+}
+
+#[test]
+fn coordinates_that_are_not_finite_span_everything() {
+    let corners = (Voxel::new(0, 0, 0), Resolution::new(10, 7, 4).last());
+    let everything = |a, b| {
+        let span = grid().voxel_span(a, b);
+        span == Span::Inside(corners.0, corners.1) || span == Span::Inside(corners.1, corners.0)
+    };
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        assert!(everything(v(bad, 1.0, 1.0), v(1.0, 1.0, 1.0)), "{bad}");
+        assert!(everything(v(1.0, 1.0, 1.0), v(1.0, bad, 1.0)), "{bad}");
+        assert!(everything(v(bad, bad, bad), v(bad, bad, bad)), "{bad}");
+    }
+}
+
+/// Coordinates near and on faces of voxels and of the grid, and far away.
+fn coordinate() -> impl Strategy<Value = f64> {
+    let step = prop_oneof![Just(0i8), -1i8..=1];
+    let face = (-4i32..15, step).prop_map(|(face, step)| match step {
+        1 => f64::from(3 * face).next_up(),
+        -1 => f64::from(3 * face).next_down(),
+        _ => f64::from(3 * face),
+    });
+    prop_oneof![4 => face, 4 => -10f64..40.0, 1 => -1e9f64..1e9, 1 => Just(-0.0)]
+}
+
+fn point() -> impl Strategy<Value = DVec3> {
+    (coordinate(), coordinate(), coordinate()).prop_map(|(x, y, z)| v(x, y, z))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn reversing_swaps_the_voxels(a in point(), b in point()) {
+        let reversed = match grid().voxel_span(b, a) {
+            Span::Inside(b, a) => Span::Inside(a, b),
+            Span::Outside => Span::Outside,
+        };
+        prop_assert_eq!(grid().voxel_span(a, b), reversed);
+    }
+
+    /// A point known to be on the segment and in the grid is in the spanned cuboid: the ends are integers at equal
+    /// distances from it, so that the point is the exact middle.
+    #[test]
+    fn the_cuboid_holds_what_is_inside(
+        middle in (0i64..=30, 0i64..=21, 0i64..=12),
+        direction in prop::array::uniform3(prop_oneof![-20i64..20, Just(0), -1_000_000_000_000i64..1_000_000_000_000]),
+    ) {
+        let middle = [middle.0, middle.1, middle.2];
+        let end = |sign: i64| {
+            let at = |axis: usize| (middle[axis] + sign * direction[axis]) as f64;
+            v(at(0), at(1), at(2))
+        };
+        let Span::Inside(a, b) = grid().voxel_span(end(-1), end(1)) else {
+            return Err(TestCaseError::fail("the segment meets the grid"));
+        };
+        let (a, b) = ([a.i, a.j, a.k], [b.i, b.j, b.k]);
+        for axis in 0..3 {
+            let (low, high) = (i64::from(a[axis].min(b[axis])), i64::from(a[axis].max(b[axis])));
+            prop_assert!((3 * low..=3 * high + 3).contains(&middle[axis]), "{:?} {:?}", a, b);
+        }
+    }
+}

@@ -1,1 +1,284 @@
+use proptest::prelude::*;
+
 use super::*;
+
+/// Units per voxel of the exact oracle: vertices are snapped to 1/16 voxel, dilations to 1/256.
+const UNIT: i128 = 512;
+
+/// The separating-axis test in integers: coordinates in 1/UNIT voxel, the box dilated by `dilation` units.
+/// The 13 axes are taken as they are defined, with no thought to speed.
+fn touches_exactly(vertices: &[[i128; 3]; 3], voxel: Voxel, dilation: i128) -> bool {
+    let centre = [voxel.i, voxel.j, voxel.k].map(|c| i128::from(c) * UNIT + UNIT / 2);
+    let radius = UNIT / 2 + dilation;
+    let p = vertices.map(|v| [0, 1, 2].map(|axis| v[axis] - centre[axis]));
+    let minus = |a: [i128; 3], b: [i128; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let cross = |a: [i128; 3], b: [i128; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let edges = [minus(p[1], p[0]), minus(p[2], p[1]), minus(p[0], p[2])];
+    let units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    let mut axes = units.to_vec();
+    axes.push(cross(edges[0], edges[1]));
+    axes.extend(
+        units
+            .iter()
+            .flat_map(|&unit| edges.map(|edge| cross(unit, edge))),
+    );
+    axes.iter().all(|axis| {
+        let reach = radius * axis.iter().map(|c| c.abs()).sum::<i128>();
+        let dots = p.map(|v| axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2]);
+        dots.iter().any(|&d| d <= reach) && dots.iter().any(|&d| d >= -reach)
+    })
+}
+
+/// A grid of voxels of size 1 whose origin is `offset`, and the set of triangles given in 1/16 voxel.
+fn voxelize_snapped(resolution: [i32; 3], offset: f64, triangles: &[[[i32; 3]; 3]]) -> VoxelSet {
+    let extent = DVec3::from_array(resolution.map(f64::from));
+    let grid = VoxelGrid::covering(DVec3::splat(offset), extent + offset, 1.0, 1 << 28)
+        .expect("a legal grid");
+    let world = |c: i32| {
+        let exact = f64::from(c) / 16.0 + offset;
+        assert_eq!(
+            f64::from(exact as f32),
+            exact,
+            "the test wants exact vertices"
+        );
+        exact as f32
+    };
+    let triangles: Vec<_> = triangles
+        .iter()
+        .map(|t| t.map(|v| Vec3::from_array(v.map(world))))
+        .collect();
+    voxelize(&grid, triangles).expect("finite vertices")
+}
+
+fn check(resolution: [i32; 3], offset: f64, triangle: [[i32; 3]; 3]) -> Result<(), TestCaseError> {
+    let set = voxelize_snapped(resolution, offset, &[triangle]);
+    let exact = triangle.map(|v| v.map(|c| i128::from(c) * (UNIT / 16)));
+    for voxel in set.resolution().voxels() {
+        let found = set.contains(voxel);
+        prop_assert!(
+            found || !touches_exactly(&exact, voxel, 0),
+            "{voxel:?} is missing for {triangle:?}"
+        );
+        prop_assert!(
+            !found || touches_exactly(&exact, voxel, 2),
+            "{voxel:?} is too much for {triangle:?}"
+        );
+    }
+    Ok(())
+}
+
+const SIDES: [i32; 3] = [9, 7, 11];
+
+/// Coordinates in 1/16 voxel: on faces, off faces, and outside the grid.
+fn coordinate() -> impl Strategy<Value = i32> {
+    prop_oneof![4 => (0..=11).prop_map(|c| 16 * c), 4 => 0..=176, 1 => -100..300, 1 => (-3..15).prop_map(|c| 16 * c + 1)]
+}
+
+fn vertex() -> impl Strategy<Value = [i32; 3]> {
+    prop::array::uniform3(coordinate())
+}
+
+fn triangle() -> impl Strategy<Value = [[i32; 3]; 3]> {
+    let offset = || prop::array::uniform3(-20..=20i32);
+    let plus = |a: [i32; 3], b: [i32; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+    prop_oneof![
+        3 => prop::array::uniform3(vertex()),
+        // Small ones.
+        3 => (vertex(), offset(), offset()).prop_map(move |(a, d, e)| [a, plus(a, d), plus(a, e)]),
+        // In a plane across an axis.
+        2 => (prop::array::uniform3(vertex()), 0..3usize).prop_map(|(t, axis)| t.map(|mut v| { v[axis] = t[0][axis]; v })),
+        // Slivers, down to segments.
+        2 => (vertex(), vertex(), prop::array::uniform3(-1..=1i32)).prop_map(move |(a, b, d)| [a, b, plus(b, d)]),
+        // Collinear and points.
+        1 => (vertex(), offset(), -4..5i32).prop_map(move |(a, d, n)| [a, plus(a, d), plus(a, d.map(|c| n * c))]),
+        1 => vertex().prop_map(|a| [a; 3]),
+        // Huge: far beyond the grid.
+        1 => prop::array::uniform3(prop::array::uniform3(-40_000..40_000i32)),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4_000))]
+
+    #[test]
+    fn equals_the_exact_test_up_to_the_dilation(triangle in triangle()) {
+        check(SIDES, 0.0, triangle)?;
+    }
+
+    /// At 2¹⁹ single precision has steps of 1/16, the finest that a voxel size of 1 allows.
+    #[test]
+    fn far_from_zero(triangle in triangle().prop_filter("exact", |t| t.iter().flatten().all(|&c| c >= 0))) {
+        check(SIDES, 524_288.0, triangle.map(|v| v.map(|c| c.min(60_000))))?;
+    }
+
+    #[test]
+    fn vertex_order_does_not_matter(t in triangle()) {
+        let set = voxelize_snapped(SIDES, 0.0, &[t]);
+        for order in [[0, 2, 1], [1, 2, 0], [2, 1, 0]] {
+            prop_assert_eq!(&voxelize_snapped(SIDES, 0.0, &[order.map(|i| t[i])]), &set);
+        }
+    }
+
+    /// Voxel sizes that no binary fraction equals: rounding decides on which side of a face a point falls, so only
+    /// the dilation saves these. The points are exactly on the triangle: vertices, and middles of edges.
+    #[test]
+    fn points_of_the_triangle_are_in_occupied_voxels(
+        size in prop::sample::select(vec![3.0, 5.0, 7.0, 0.1, 1.0 / 3.0, 0.7]),
+        origin in prop::array::uniform3(-20i32..=0),
+        vertices in prop::array::uniform3(prop::array::uniform3(prop_oneof![0..=40i32, (0..=13).prop_map(|c| 3 * c)])),
+    ) {
+        let origin = DVec3::from_array(origin.map(f64::from));
+        let grid = VoxelGrid::covering(origin, DVec3::splat(42.0), size, 1 << 30).expect("a legal grid");
+        let set = voxelize(&grid, vec![vertices.map(|v| Vec3::from_array(v.map(|c| c as f32)))]).expect("finite");
+        let [a, b, c] = vertices.map(|v| DVec3::from_array(v.map(f64::from)));
+        for point in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (2.0 * a + b + c) / 4.0] {
+            let voxel = grid.voxel_containing(point).expect("inside");
+            prop_assert!(set.contains(voxel), "{point} in {voxel:?}");
+        }
+    }
+}
+
+#[test]
+fn triangle_in_a_face_marks_both_sides() {
+    for axis in 0..3 {
+        let mut triangle = [[40, 40, 40], [72, 40, 40], [40, 72, 40]].map(|mut v: [i32; 3]| {
+            v.rotate_right(axis);
+            v
+        });
+        for v in &mut triangle {
+            v[(axis + 2) % 3] = 48;
+        }
+        let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
+        let normal = (axis + 2) % 3;
+        let layers: std::collections::BTreeSet<_> =
+            set.iter().map(|v| [v.i, v.j, v.k][normal]).collect();
+        assert_eq!(layers.into_iter().collect::<Vec<_>>(), [2, 3]);
+    }
+}
+
+#[test]
+fn point_on_a_corner_marks_eight_voxels() {
+    assert_eq!(
+        voxelize_snapped([8, 8, 8], 0.0, &[[[32, 48, 64]; 3]]).count(),
+        8
+    );
+    assert_eq!(
+        voxelize_snapped([8, 8, 8], 0.0, &[[[0, 0, 0]; 3]]).count(),
+        1
+    );
+}
+
+#[test]
+fn triangles_on_the_greatest_face_mark_the_last_layer() {
+    let triangle = [[0, 0, 128], [128, 0, 128], [0, 128, 128]];
+    let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
+    assert!(!set.is_empty() && set.iter().all(|v| v.k == 7));
+    // A bound that is no whole number of voxels, met exactly.
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(0.3f32.into()), 0.1, 1 << 20)
+        .expect("a legal grid");
+    let set = voxelize(&grid, vec![[Vec3::splat(0.3); 3]]).expect("finite");
+    assert!(
+        set.contains(
+            grid.voxel_containing(DVec3::splat(0.3f32.into()))
+                .expect("inside")
+        )
+    );
+}
+
+#[test]
+fn a_triangle_across_a_large_grid_is_quadratic() {
+    let n = 16 * 512;
+    let set = voxelize_snapped([512, 512, 512], 0.0, &[[[0, 0, 0], [n, n, 0], [0, n, n]]]);
+    // Half of a diagonal square takes at most some three voxels for each column.
+    assert!((130_000..800_000).contains(&set.count()), "{}", set.count());
+    let line = voxelize_snapped(
+        [512, 512, 512],
+        0.0,
+        &[[[0, 0, 0], [n, n, n], [n / 2, n / 2, n / 2]]],
+    );
+    assert!(
+        (512..4 * 512 * 2).contains(&line.count()),
+        "{}",
+        line.count()
+    );
+}
+
+#[test]
+fn tiny_and_needle_triangles_do_not_vanish() {
+    let grid =
+        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
+    let at = |t: [[f32; 3]; 3]| voxelize(&grid, vec![t.map(Vec3::from_array)]).expect("finite");
+    assert_eq!(
+        at([[1e-40, 1e-42, 0.0], [1e-45, 1e-41, 0.0], [0.0, -0.0, 1e-45]]).count(),
+        1
+    );
+    let e = f32::EPSILON;
+    let needle = at([[0.5, 0.5, 0.5], [7.5, 7.5, 7.5], [7.5, 7.5 + 4.0 * e, 7.5]]);
+    assert!((0..8).all(|i| needle.contains(Voxel::new(i, i, i))));
+    let across_zero = at([[-1e-30, 4.0, 4.0], [1e-30, 4.5, 4.5], [-1e-30, 4.0, 4.5]]);
+    assert!(across_zero.contains(Voxel::new(0, 4, 4)));
+}
+
+#[test]
+fn vertices_that_are_not_finite_are_errors() {
+    let grid =
+        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let result = voxelize(
+            &grid,
+            vec![
+                [Vec3::ONE; 3],
+                [Vec3::ZERO, Vec3::ONE, Vec3::new(0.0, bad, 0.0)],
+            ],
+        );
+        assert_eq!(result, Err(VoxelError::NonFiniteTriangle));
+    }
+    let far = voxelize(
+        &grid,
+        vec![[
+            Vec3::splat(f32::MAX),
+            Vec3::splat(f32::MIN),
+            Vec3::new(f32::MAX, 0.0, 0.0),
+        ]],
+    );
+    assert!(far.is_ok_and(|set| (0..8).all(|i| set.contains(Voxel::new(i, i, i)))));
+}
+
+/// Prints the speed of the fast path and of medium triangles: `cargo test --release -p vdf-voxel -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement"]
+fn speed() {
+    let grid =
+        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(256.0), 1.0, 1 << 24).expect("a legal grid");
+    for size in [0.3f32, 3.0, 30.0] {
+        let count = 2_000_000 / (size * size).max(1.0) as usize;
+        let triangles: Vec<_> = (0..count)
+            .map(|n| {
+                let corner = Vec3::new(
+                    (n * 37 % 2200) as f32,
+                    (n * 101 % 2210) as f32,
+                    (n * 53 % 2230) as f32,
+                ) * 0.1;
+                [
+                    corner,
+                    corner + Vec3::new(size, 0.2 * size, 0.1),
+                    corner + Vec3::new(0.1, size, 0.7 * size),
+                ]
+            })
+            .collect();
+        let start = std::time::Instant::now();
+        let set = voxelize(&grid, triangles).expect("finite");
+        let seconds = start.elapsed().as_secs_f64();
+        println!(
+            "size {size}: {:.2} M triangles/s, {} voxels",
+            count as f64 / seconds * 1e-6,
+            set.count()
+        );
+    }
+}
