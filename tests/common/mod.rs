@@ -1,10 +1,10 @@
 //! What the end-to-end tests share: scenes made in code and a quiet way to render them.
-#![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
 use vdf::render::{
     IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, Triangle, render,
     scene::{
-        Boundary, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
+        self, Boundary, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
         ReconstructionFilter, Scene,
     },
 };
@@ -140,4 +140,16 @@ pub fn integrate(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
 /// The camera's position.
 pub fn eye(scene: &Scene) -> DVec3 {
     scene.sensor.world_from_camera.w_axis.truncate()
+}
+
+/// A built-in scene with `-D` definitions.
+pub fn builtin(name: &str, defines: &[(&str, &str)]) -> Scene {
+    let source = scene::builtin(name).expect("a built-in name");
+    let defines = defines.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    Scene::from_source(&source, &scene::LoadOptions { defines }).expect("built-in scenes load")
+}
+
+/// The methods that prove something.
+pub fn all_methods() -> [Method; 4] {
+    [Method::Ndf, Method::Amr, Method::NdfSn, Method::AmrSn]
 }
