@@ -44,7 +44,10 @@ pub(super) fn media_are_consistent(
         if around.inner != sensor.medium {
             let (message, help) = match (around.inner, sensor.medium) {
                 (Some(_), None) => (
-                    format!("the camera is inside the medium of the shape at {}, but the sensor has no medium", around.at),
+                    format!(
+                        "the camera is inside the medium of the shape at {}, but the sensor has no medium",
+                        around.at
+                    ),
                     "put a <ref id=\"…\"/> to that medium into the sensor".to_owned(),
                 ),
                 _ => (
@@ -90,8 +93,10 @@ impl<'a> Closed<'a> {
         let high = vertices().fold(DVec3::NEG_INFINITY, DVec3::max);
         // Sum of the signed tetrahedra; the sign tells which way the normals point.
         let centre = (low + high) / 2.0;
-        let volume: f64 = boundary.triangles.iter().map(|t| t.area_normal().dot(t.vertices_f64()[0] - centre) / 6.0).sum();
-        let (inner, outer) = if volume >= 0.0 { (boundary.interior, boundary.exterior) } else { (boundary.exterior, boundary.interior) };
+        let volume: f64 =
+            boundary.triangles.iter().map(|t| t.area_normal().dot(t.vertices_f64()[0] - centre) / 6.0).sum();
+        let (inner, outer) =
+            if volume >= 0.0 { (boundary.interior, boundary.exterior) } else { (boundary.exterior, boundary.interior) };
         Some(Self { triangles: &boundary.triangles, at, inner, outer, volume: volume.abs(), low, high })
     }
 

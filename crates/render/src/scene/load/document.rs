@@ -124,7 +124,8 @@ impl<'a> Ids<'a> {
         match self.by_name.insert(id, element) {
             None => Ok(()),
             Some(earlier) => {
-                Err(at.error(format!("the id \"{id}\" is already used at {}", earlier.at), "give each object its own id"))
+                Err(at
+                    .error(format!("the id \"{id}\" is already used at {}", earlier.at), "give each object its own id"))
             }
         }
     }
@@ -167,7 +168,9 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn file(&mut self, path: &Path, includer: Option<&Place>) -> Result<Element, RenderError> {
         let bytes = self.source.read(path).map_err(|e| match includer {
-            Some(at) => at.error(format!("cannot read \"{}\": {e}", path.display()), "the path is relative to this file"),
+            Some(at) => {
+                at.error(format!("cannot read \"{}\": {e}", path.display()), "the path is relative to this file")
+            }
             None => RenderError::SceneFile { path: path.to_path_buf(), message: format!("cannot read the scene: {e}") },
         })?;
         let text = String::from_utf8(bytes).map_err(|e| {
@@ -185,13 +188,20 @@ impl Reader<'_> {
         let root = self.element(document.root_element(), &lines, 0)?;
         self.open_files.pop();
         if root.tag != "scene" {
-            return Err(root.at.error(format!("the root element is <{}>", root.tag), "it must be <scene version=\"3.0.0\">"));
+            return Err(root
+                .at
+                .error(format!("the root element is <{}>", root.tag), "it must be <scene version=\"3.0.0\">"));
         }
         check_version(&root)?;
         Ok(root)
     }
 
-    fn element(&mut self, node: roxmltree::Node<'_, '_>, lines: &Lines<'_>, depth: usize) -> Result<Element, RenderError> {
+    fn element(
+        &mut self,
+        node: roxmltree::Node<'_, '_>,
+        lines: &Lines<'_>,
+        depth: usize,
+    ) -> Result<Element, RenderError> {
         let at = lines.place(node.range().start);
         if depth > MAX_ELEMENT_DEPTH {
             return Err(at.error(format!("elements nest more than {MAX_ELEMENT_DEPTH} deep"), ""));
@@ -228,7 +238,10 @@ impl Reader<'_> {
             if child.is_element() {
                 if !element.is_object() && !matches!(element.tag.as_str(), "scene" | "transform") {
                     let at = lines.place(child.range().start);
-                    return Err(at.error(format!("an element inside <{}>", element.tag), "only objects and <transform> have children"));
+                    return Err(at.error(
+                        format!("an element inside <{}>", element.tag),
+                        "only objects and <transform> have children",
+                    ));
                 }
                 self.child(child, lines, depth, &mut element)?;
             }
@@ -245,10 +258,9 @@ impl Reader<'_> {
     ) -> Result<(), RenderError> {
         let child = self.element(node, lines, depth + 1)?;
         if matches!(child.tag.as_str(), "default" | "include" | "alias") && parent.tag != "scene" {
-            return Err(child.at.error(
-                format!("<{}> inside <{}>", child.tag, parent.tag),
-                "it must stand directly inside <scene>",
-            ));
+            return Err(child
+                .at
+                .error(format!("<{}> inside <{}>", child.tag, parent.tag), "it must stand directly inside <scene>"));
         }
         match child.tag.as_str() {
             "default" => self.parameters.default(child.require("name")?, child.require("value")?, &child.at)?,

@@ -106,7 +106,8 @@ impl<'a> Loader<'a> {
                 }
             }
         }
-        let missing = |what: &str, how: &str| Err(root.at.error(format!("the scene has no {what}"), format!("add {how}")));
+        let missing =
+            |what: &str, how: &str| Err(root.at.error(format!("the scene has no {what}"), format!("add {how}")));
         let Some(sensor) = sensor else { return missing("sensor", "<sensor type=\"perspective\">") };
         let Some(integrator) = integrator else { return missing("integrator", "<integrator type=\"volpath\"/>") };
         let integrator = camera::integrator(&self, integrator)?;

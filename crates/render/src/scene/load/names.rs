@@ -52,8 +52,8 @@ pub(super) fn foreign_name(name: &str) -> Option<(String, String)> {
 /// "did you mean …? supported: …", for a name that is none of `known`.
 pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     let mut help = String::new();
-    let nearest = known.iter().max_by(|a, b| strsim::jaro_winkler(name, a).total_cmp(&strsim::jaro_winkler(name, b)));
-    if let Some(nearest) = nearest.filter(|n| strsim::jaro_winkler(name, n) > 0.75) {
+    let nearest = known.iter().min_by_key(|k| strsim::damerau_levenshtein(name, k));
+    if let Some(nearest) = nearest.filter(|n| strsim::damerau_levenshtein(name, n) <= 1 + n.len() / 4) {
         let _ = write!(help, "did you mean \"{nearest}\"? ");
     }
     if known.is_empty() {

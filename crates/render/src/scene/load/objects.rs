@@ -21,7 +21,9 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
     let sigma_t = object.grey("sigma_t", 1.0)?;
     if sigma_t < 0.0 || !(sigma_t * scale).is_finite() {
         let at = object.place_of("sigma_t");
-        return Err(at.error(format!("the extinction is {}", sigma_t * scale), "sigma_t × scale must be finite and at least 0"));
+        return Err(
+            at.error(format!("the extinction is {}", sigma_t * scale), "sigma_t × scale must be finite and at least 0")
+        );
     }
     let phase = match object.at_most_one("phase")? {
         Some(nested) => phase(loader, nested.object)?,
@@ -38,7 +40,9 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
 pub(super) fn phase<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Phase, RenderError> {
     let mut object = Object::new(loader, element, &["isotropic", "hg"])?;
     let phase = if object.kind() == "hg" {
-        Phase::HenyeyGreenstein { g: object.float_where("g", 0.8, |g| g > -1.0 && g < 1.0, "between -1 and 1, both excluded")? }
+        Phase::HenyeyGreenstein {
+            g: object.float_where("g", 0.8, |g| g > -1.0 && g < 1.0, "between -1 and 1, both excluded")?,
+        }
     } else {
         Phase::Isotropic
     };
@@ -61,7 +65,10 @@ pub(super) fn bsdf<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Opti
             let (front, back) = match nested.as_slice() {
                 [both] => (both, both),
                 [front, back] => (front, back),
-                other => return Err(object.error(format!("{} nested BSDFs", other.len()), "nest one diffuse, or two: front and back")),
+                other => {
+                    return Err(object
+                        .error(format!("{} nested BSDFs", other.len()), "nest one diffuse, or two: front and back"));
+                }
             };
             Some(Bsdf { front: diffuse(loader, front.object)?, back: diffuse(loader, back.object)? })
         }

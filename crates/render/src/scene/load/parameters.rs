@@ -34,8 +34,7 @@ impl Parameters {
                     help: "write -D name=value".to_owned(),
                 });
             }
-            by_name
-                .insert(name.clone(), Parameter { value: value.clone(), from_command_line: true, used: false });
+            by_name.insert(name.clone(), Parameter { value: value.clone(), from_command_line: true, used: false });
         }
         Ok(Self { by_name })
     }
@@ -66,8 +65,11 @@ impl Parameters {
                 continue;
             }
             out.push_str(before);
-            let best =
-                self.by_name.iter_mut().filter(|(name, _)| after.starts_with(name.as_str())).max_by_key(|(n, _)| n.len());
+            let best = self
+                .by_name
+                .iter_mut()
+                .filter(|(name, _)| after.starts_with(name.as_str()))
+                .max_by_key(|(n, _)| n.len());
             let Some((name, parameter)) = best else {
                 let end = after.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(after.len());
                 let known: Vec<&str> = self.by_name.keys().map(String::as_str).collect();

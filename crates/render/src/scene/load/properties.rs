@@ -37,10 +37,9 @@ impl<'a> Object<'a> {
         let kind = element.require("type")?;
         if !kinds.contains(&kind) {
             let at = element.attribute("type").map_or(&element.at, |a| &a.at);
-            return Err(at.error(
-                format!("{} type \"{kind}\" is not supported", element.tag),
-                names::suggest(kind, kinds),
-            ));
+            return Err(
+                at.error(format!("{} type \"{kind}\" is not supported", element.tag), names::suggest(kind, kinds))
+            );
         }
         let mut seen = HashSet::new();
         let mut children = Vec::new();
@@ -56,7 +55,9 @@ impl<'a> Object<'a> {
                     return Err(child.at.error(message, help));
                 }
                 if !seen.insert(name) {
-                    return Err(child.at.error(format!("the property \"{name}\" is given twice"), "remove one of them"));
+                    return Err(child
+                        .at
+                        .error(format!("the property \"{name}\" is given twice"), "remove one of them"));
                 }
             }
             children.push((child, target, false));
@@ -205,7 +206,9 @@ impl<'a> Object<'a> {
         if value.x != value.y || value.y != value.z {
             return Err(element.at.error(
                 format!("chromatic {name} ({}, {}, {}) is not supported", value.x, value.y, value.z),
-                format!("give the three channels one value, or write <float name=\"{name}\" …>; the albedo may be chromatic"),
+                format!(
+                    "give the three channels one value, or write <float name=\"{name}\" …>; the albedo may be chromatic"
+                ),
             ));
         }
         if value.x > 1.0 {

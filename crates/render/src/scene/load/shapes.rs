@@ -21,9 +21,14 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
         "obj" => {
             object.boolean("flip_tex_coords", true)?;
             if !object.boolean("face_normals", false)? {
-                loader.warn(&element.at, "the mesh has no face_normals=true: vdf shades with geometric normals, Mitsuba would smooth them");
+                loader.warn(
+                    &element.at,
+                    "the mesh has no face_normals=true: vdf shades with geometric normals, Mitsuba would smooth them",
+                );
             }
-            let name = object.string("filename")?.ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
+            let name = object
+                .string("filename")?
+                .ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
             obj(loader, name, object.place_of("filename"), to_world)?
         }
         "cube" => {
@@ -33,10 +38,15 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
         _ => rectangle(to_world),
     };
     if !triangles.iter().all(Triangle::is_finite) {
-        return Err(object.error("its vertices are too large for single precision after to_world", "scale the scene down"));
+        return Err(
+            object.error("its vertices are too large for single precision after to_world", "scale the scene down")
+        );
     }
     if to_world.determinant() < 0.0 {
-        loader.warn(&element.at, "to_world mirrors the shape: check which side its normals point to (flip_normals turns them)");
+        loader.warn(
+            &element.at,
+            "to_world mirrors the shape: check which side its normals point to (flip_normals turns them)",
+        );
     }
     if flip {
         for triangle in &mut triangles {
@@ -170,7 +180,10 @@ fn rectangle(to_world: DMat4) -> Vec<Triangle> {
 fn obj(loader: &Loader<'_>, name: &str, at: &Place, to_world: DMat4) -> Result<Vec<Triangle>, RenderError> {
     let path = sibling(loader.source.path(), name);
     let bytes = loader.source.read(&path).map_err(|e| {
-        at.error(format!("cannot read \"{}\": {e}", path.display()), "the path is relative to the folder of the scene file")
+        at.error(
+            format!("cannot read \"{}\": {e}", path.display()),
+            "the path is relative to the folder of the scene file",
+        )
     })?;
     let fail = |message: String| at.error(format!("{}: {message}", path.display()), "");
     let text = String::from_utf8_lossy(&bytes);

@@ -105,7 +105,9 @@ fn a_builtin_scene_written_to_disk_loads_from_there() {
 
 #[test]
 fn parameters_are_substituted_and_defines_win() {
-    let text = scene("<default name='a' value='1'/><default name='ab' value='2'/><emitter type='point'><rgb name='intensity' value='$ab'/></emitter>");
+    let text = scene(
+        "<default name='a' value='1'/><default name='ab' value='2'/><emitter type='point'><rgb name='intensity' value='$ab'/></emitter>",
+    );
     let intensity = |defines: &[(&str, &str)]| load_with(&text, &[], defines).map(|s| s.emitters[0]);
     let expect = |v| Emitter::Point { position: DVec3::ZERO, intensity: Vec3::splat(v) };
     assert_eq!(intensity(&[]).unwrap(), expect(2.0));
@@ -141,12 +143,23 @@ fn includes_are_relative_and_cannot_loop() {
 
 #[test]
 fn references_may_point_forward_and_bad_ones_are_refused() {
-    let loaded = load("<shape type='cube'><ref id='b'/></shape><bsdf type='diffuse' id='b'><rgb name='reflectance' value='1'/></bsdf>");
+    let loaded = load(
+        "<shape type='cube'><ref id='b'/></shape><bsdf type='diffuse' id='b'><rgb name='reflectance' value='1'/></bsdf>",
+    );
     assert_eq!(loaded.surfaces[0].bsdf.front, Vec3::ONE);
-    refused("<shape type='cube'><ref id='fgo'/></shape><medium type='homogeneous' id='fog'/>", "3:20", "did you mean \"fog\"");
+    refused(
+        "<shape type='cube'><ref id='fgo'/></shape><medium type='homogeneous' id='fog'/>",
+        "3:20",
+        "did you mean \"fog\"",
+    );
     refused("<bsdf type='null' id='a'/>\n<bsdf type='null' id='a'/>", "4:19", "already used at s.xml:3:1");
     refused("<bsdf type='twosided' id='a'><ref id='a'/></bsdf>", "3:30", "cycle");
-    assert_eq!(load("<bsdf type='diffuse' id='a'/><alias id='a' as='b'/><shape type='cube'><ref id='b'/></shape>").surfaces.len(), 1);
+    assert_eq!(
+        load("<bsdf type='diffuse' id='a'/><alias id='a' as='b'/><shape type='cube'><ref id='b'/></shape>")
+            .surfaces
+            .len(),
+        1
+    );
 }
 
 #[test]
@@ -154,7 +167,11 @@ fn unknown_names_are_refused_with_the_nearest_one() {
     refused("<shpae type='cube'/>", "3:1", "did you mean \"shape\"");
     refused("<shape type='sphere'/>", "3:8", "supported: obj, cube, rectangle");
     refused("<shape type='cube' tpye='x'/>", "3:20", "did you mean \"type\"");
-    refused("<shape type='cube'><boolean name='flip_normal' value='true'/></shape>", "3:20", "did you mean \"flip_normals\"");
+    refused(
+        "<shape type='cube'><boolean name='flip_normal' value='true'/></shape>",
+        "3:20",
+        "did you mean \"flip_normals\"",
+    );
     refused("<shape type='cube'><phase type='hg'/></shape>", "3:20", "takes no <phase>");
     refused("<shape type='cube'/>x", "3:21", "text inside <scene>");
     refused("<shape type='cube'><string name='flip_normals' value='a'/></shape>", "3:20", "cannot be a <string>");
@@ -201,7 +218,8 @@ fn values_outside_their_range_are_refused() {
     refused(&medium("<phase type='hg'><float name='g' value='1'/></phase>"), "3:45", "between -1 and 1");
     refused(&medium("<boolean name='sample_emitters' value='FALSE'/>"), "3:28", "not supported");
     refused("<shape type='cube'><boolean name='flip_normals' value='yes'/></shape>", "3:20", "not a boolean");
-    let film = |inner: &str| format!("{HEAD}<sensor type='perspective'><film type='hdrfilm'>{inner}</film></sensor></scene>");
+    let film =
+        |inner: &str| format!("{HEAD}<sensor type='perspective'><film type='hdrfilm'>{inner}</film></sensor></scene>");
     refused_text(&film("<integer name='width' value='1.0'/>"), &[], "s.xml:3:49", "not an integer");
     refused_text(&film("<integer name='width' value='0'/>"), &[], "s.xml:3:49", "between 1 and");
     refused_text(&film("<integer name='crop_offset_x' value='9'/>"), &[], "s.xml:3:28", "beyond the film");
@@ -210,7 +228,9 @@ fn values_outside_their_range_are_refused() {
 
 #[test]
 fn media_are_read_with_scale_and_phase() {
-    let scene = load("<medium type='homogeneous'><rgb name='sigma_t' value='.5'/><float name='scale' value='4'/><rgb name='albedo' value='.1, .2 .3'/><phase type='hg'/></medium>");
+    let scene = load(
+        "<medium type='homogeneous'><rgb name='sigma_t' value='.5'/><float name='scale' value='4'/><rgb name='albedo' value='.1, .2 .3'/><phase type='hg'/></medium>",
+    );
     assert!((scene.media[0].sigma_t - 2.0).abs() < 1e-12);
     assert_eq!(scene.media[0].albedo, Vec3::new(0.1, 0.2, 0.3));
     assert_eq!(scene.media[0].phase, Phase::HenyeyGreenstein { g: 0.8 });
@@ -239,8 +259,10 @@ fn transforms_apply_in_listed_order() {
 
 #[test]
 fn cube_and_rectangle_face_outward() {
-    let scene = load("<shape type='cube'/><shape type='rectangle'/><shape type='rectangle'><boolean name='flip_normals' value='True'/></shape>\
-        <shape type='rectangle'><transform name='to_world'><scale x='-1'/></transform></shape>");
+    let scene = load(
+        "<shape type='cube'/><shape type='rectangle'/><shape type='rectangle'><boolean name='flip_normals' value='True'/></shape>\
+        <shape type='rectangle'><transform name='to_world'><scale x='-1'/></transform></shape>",
+    );
     assert_eq!(scene.surfaces[0].triangles.len(), 12);
     for t in &scene.surfaces[0].triangles {
         assert!(t.area_normal().dot(t.vertices_f64()[0]) > 0.0);
@@ -255,7 +277,12 @@ fn cube_and_rectangle_face_outward() {
 fn obj_files_are_read_or_refused_by_name() {
     let text = scene("<shape type='obj'><string name='filename' value='m.obj'/></shape>");
     let v = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
-    let good = load_with(&text, &[("m.obj", &format!("{v}g a\nf 1 2 3 4\ng b\nusemtl x\nf 1//1 2 3\n").replace("//1", ""))], &[]).unwrap();
+    let good = load_with(
+        &text,
+        &[("m.obj", &format!("{v}g a\nf 1 2 3 4\ng b\nusemtl x\nf 1//1 2 3\n").replace("//1", ""))],
+        &[],
+    )
+    .unwrap();
     assert_eq!(good.surfaces[0].triangles.len(), 3);
     assert!(good.warnings[0].contains("face_normals"));
     let bad = |faces: &str, part: &str| refused_text(&text, &[("m.obj", &format!("{v}{faces}"))], "s.xml:3:19", part);
@@ -270,7 +297,9 @@ fn obj_files_are_read_or_refused_by_name() {
 
 #[test]
 fn emitters_are_read() {
-    let scene = load("<shape type='rectangle'><emitter type='area'><rgb name='radiance' value='1 2 3'/></emitter></shape><emitter type='constant'/>");
+    let scene = load(
+        "<shape type='rectangle'><emitter type='area'><rgb name='radiance' value='1 2 3'/></emitter></shape><emitter type='constant'/>",
+    );
     assert_eq!(scene.emitters[0], Emitter::Area { surface: 0 });
     assert_eq!(scene.surfaces[0].radiance, Some(Vec3::new(1.0, 2.0, 3.0)));
     assert_eq!(scene.surfaces[0].bsdf.front, Vec3::ZERO);
@@ -291,15 +320,28 @@ fn the_field_of_view_follows_its_axis() {
         assert!((got - expected).abs() < 1e-12, "{axis}: {got}");
     }
     assert!((tan("") - f64::hypot(36.0, 24.0) / 100.0 * 0.8).abs() < 1e-12);
-    refused_text(&with_sensor("", &format!("{fov}<string name='focal_length' value='50mm'/>")), &[], "s.xml:4:80", "both");
+    refused_text(
+        &with_sensor("", &format!("{fov}<string name='focal_length' value='50mm'/>")),
+        &[],
+        "s.xml:4:80",
+        "both",
+    );
     let scaled = "<transform name='to_world'><scale value='2'/></transform>";
     refused_text(&with_sensor("", scaled), &[], "s.xml:4:50", "scales");
 }
 
 #[test]
 fn traps_around_shapes() {
-    refused(&format!("{FOG}\n<shape type='cube'><ref id='fog' name='interior'/></shape>"), "4:1", "null BSDF is opaque");
-    refused(&format!("{FOG}\n<shape type='cube'><bsdf type='null'/><ref id='fog' name='inside'/></shape>"), "4:39", "\"interior\"");
+    refused(
+        &format!("{FOG}\n<shape type='cube'><ref id='fog' name='interior'/></shape>"),
+        "4:1",
+        "null BSDF is opaque",
+    );
+    refused(
+        &format!("{FOG}\n<shape type='cube'><bsdf type='null'/><ref id='fog' name='inside'/></shape>"),
+        "4:39",
+        "\"interior\"",
+    );
     refused(&format!("{FOG}\n<shape type='cube'><bsdf type='null'/><ref id='fog'/></shape>"), "4:39", "\"interior\"");
     refused("<shape type='cube'><bsdf type='null'/><emitter type='area'/></shape>", "3:1", "null BSDF");
     let nothing = load("<shape type='cube'><bsdf type='null'/></shape>");
@@ -323,7 +365,8 @@ fn the_cameras_medium_is_checked() {
 
 #[test]
 fn fog_must_not_vanish_behind_an_inner_boundary() {
-    let nested = |more: &str| with_sensor(&format!("{FOG}{}\n{}", fog_cube(9.0, ""), fog_cube(1.0, more)), "<ref id='fog'/>");
+    let nested =
+        |more: &str| with_sensor(&format!("{FOG}{}\n{}", fog_cube(9.0, ""), fog_cube(1.0, more)), "<ref id='fog'/>");
     refused_text(&nested(""), &[], "s.xml:4:1", "would vanish");
     assert!(load_with(&nested("<ref id='fog' name='exterior'/>"), &[], &[]).is_ok());
     let away = "<transform name='to_world'><translate z='-5'/></transform><ref id='fog'/>";

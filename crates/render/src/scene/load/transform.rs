@@ -88,8 +88,13 @@ fn lookat(element: &Element) -> Result<DMat4, RenderError> {
     let forward = (three(element, "target")? - origin).try_normalize();
     let forward = forward.ok_or_else(|| element.at.error("lookat: origin and target are the same point", ""))?;
     let up = if element.attribute("up").is_some() { three(element, "up")? } else { any_perpendicular(forward) };
-    let left = up.cross(forward).try_normalize().filter(|left| left.is_finite() && up.normalize().cross(forward).length() > 1e-9);
-    let left = left.ok_or_else(|| element.at.error("lookat: \"up\" is parallel to the view direction", "choose another up vector"))?;
+    let left = up
+        .cross(forward)
+        .try_normalize()
+        .filter(|left| left.is_finite() && up.normalize().cross(forward).length() > 1e-9);
+    let left = left.ok_or_else(|| {
+        element.at.error("lookat: \"up\" is parallel to the view direction", "choose another up vector")
+    })?;
     let up = forward.cross(left);
     Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), forward.extend(0.0), origin.extend(1.0)))
 }
