@@ -8,6 +8,8 @@ use crate::RenderError;
 
 /// A default may contain other parameters; without a bound each could double the length of the one before.
 const MAX_VALUE_LENGTH: usize = 1 << 16;
+/// All values together, so that many elements with long values cannot fill the memory.
+const MAX_TOTAL_LENGTH: usize = 1 << 26;
 
 #[derive(Debug)]
 struct Parameter {
@@ -20,6 +22,8 @@ struct Parameter {
 #[derive(Debug, Default)]
 pub(super) struct Parameters {
     by_name: BTreeMap<String, Parameter>,
+    /// Bytes that were put in so far.
+    total: usize,
 }
 
 impl Parameters {
@@ -36,7 +40,7 @@ impl Parameters {
             }
             by_name.insert(name.clone(), Parameter { value: value.clone(), from_command_line: true, used: false });
         }
-        Ok(Self { by_name })
+        Ok(Self { by_name, total: 0 })
     }
 
     /// `<default name= value=>`; does nothing if the name is defined already.
@@ -84,9 +88,12 @@ impl Parameters {
             };
             parameter.used = true;
             out.push_str(&parameter.value);
+            self.total += parameter.value.len();
             rest = &after[name.len()..];
-            if out.len() > MAX_VALUE_LENGTH {
-                return Err(at.error("the value is too long after its parameters are put in", ""));
+            if out.len() > MAX_VALUE_LENGTH || self.total > MAX_TOTAL_LENGTH {
+                return Err(
+                    at.error("the value is too long, or all values together are, after the parameters are put in", "")
+                );
             }
         }
         out.push_str(rest);

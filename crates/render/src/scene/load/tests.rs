@@ -126,6 +126,9 @@ fn parameters_cannot_blow_up() {
     }
     let error = load_with(&scene(&body), &[], &[]).unwrap_err().to_string();
     assert!(error.contains("too long"), "{error}");
+    let many = format!("<default name='p' value='{}'/>{}", "x".repeat(60_000), "<alias id='a' as='$p'/>".repeat(2000));
+    let error = load_with(&scene(&many), &[], &[]).unwrap_err().to_string();
+    assert!(error.contains("too long"), "{error}");
 }
 
 #[test]
