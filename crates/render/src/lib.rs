@@ -4,6 +4,7 @@
 //! distance field, safe neighbourhoods: the proofs) → an integrator, tile by tile → an image and its statistics.
 
 mod acceleration;
+mod error;
 mod frame;
 pub mod geometry;
 mod integrator;
@@ -23,6 +24,7 @@ mod world;
 pub use acceleration::{Acceleration, BuildReport};
 pub use lights::{LightSample, Lights};
 pub use media::{Flight, Media};
+pub use error::RenderError;
 pub use mesh::Triangle;
 pub use render::render;
 pub use sampler::Sampler;

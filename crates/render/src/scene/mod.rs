@@ -1,8 +1,14 @@
 //! The scene model: what a scene file describes, resolved, checked and ready to render.
 
+mod builtin;
+mod load;
 mod model;
+mod source;
 
+pub use builtin::{DEFAULT_SCENE, builtin, builtin_names};
+pub use load::LoadOptions;
 pub use model::{
     Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
     ReconstructionFilter, Scene, Surface,
 };
+pub use source::{EmbeddedFile, SceneSource};

@@ -1,0 +1,57 @@
+//! The errors of this crate.
+
+use std::path::PathBuf;
+
+/// Why a scene could not be loaded or rendered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// A scene file says something that is wrong or not supported.
+    #[error("{}:{line}:{column}: {message}{}", path.display(), help_line(help))]
+    Scene {
+        /// The file, as it was named by the user or by the file that includes it.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u32,
+        /// Column in characters, from 1.
+        column: u32,
+        /// What is wrong.
+        message: String,
+        /// How to mend it; may be empty.
+        help: String,
+    },
+    /// A file of the scene could not be read.
+    #[error("{}: {message}", path.display())]
+    SceneFile {
+        /// The file.
+        path: PathBuf,
+        /// Why it could not be read.
+        message: String,
+    },
+    /// A definition given with `-D` is malformed, or the scene never uses it.
+    #[error("-D {name}: {message}{}", help_line(help))]
+    Define {
+        /// The name that was defined.
+        name: String,
+        /// What is wrong.
+        message: String,
+        /// How to mend it; may be empty.
+        help: String,
+    },
+    /// The voxel size does not fit the scene.
+    #[error(transparent)]
+    Voxel(#[from] vdf_voxel::VoxelError),
+    /// The threads could not be started.
+    #[error("cannot start the rendering threads: {message}")]
+    Threads {
+        /// Why not.
+        message: String,
+    },
+    /// The render was asked to stop.
+    #[error("interrupted")]
+    Cancelled,
+}
+
+fn help_line(help: &str) -> String {
+    if help.is_empty() { String::new() } else { format!("\n  help: {help}") }
+}
