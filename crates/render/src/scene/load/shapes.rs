@@ -48,17 +48,21 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
             "to_world mirrors the shape: check which side its normals point to (flip_normals turns them)",
         );
     }
-    if flip {
-        for triangle in &mut triangles {
-            triangle.vertices.swap(1, 2);
-        }
-    }
     let (interior, exterior) = media(loader, &mut object)?;
     let radiance = area_emitter(loader, &mut object)?;
     let bsdf = match object.at_most_one("bsdf")? {
         Some(nested) => objects::bsdf(loader, nested.object)?,
         None => Some(objects::default_bsdf(radiance.is_some())),
     };
+    // As Mitsuba 3.9.1 was seen to do: the winding of the moved vertices decides on which side a medium is, and how a
+    // mesh shades; but cube and rectangle shade with their own normals, which a mirroring does not turn round.
+    let own_normals = bsdf.is_some() && object.kind() != "obj";
+    let turned_back = own_normals && to_world.determinant() < 0.0;
+    if flip != turned_back {
+        for triangle in &mut triangles {
+            triangle.vertices.swap(1, 2);
+        }
+    }
     object.finish()?;
     attach(loader, element, triangles, bsdf, radiance, [interior, exterior])
 }
@@ -143,7 +147,7 @@ fn transformed(to_world: DMat4, corners: [DVec3; 3]) -> Triangle {
     Triangle::new(a, b, c)
 }
 
-/// [−1, 1]³, normals outward. As in Mitsuba the winding is that of the moved vertices, also under a mirroring.
+/// [−1, 1]³, normals outward.
 fn cube(to_world: DMat4) -> Vec<Triangle> {
     let mut triangles = Vec::with_capacity(12);
     for axis in 0..3 {
@@ -164,16 +168,10 @@ fn cube(to_world: DMat4) -> Vec<Triangle> {
     triangles
 }
 
-/// [−1, 1]² at z = 0. Its normal is +Z as a normal is transformed: a mirroring does not turn it to the other side.
+/// [−1, 1]² at z = 0, normal +Z.
 fn rectangle(to_world: DMat4) -> Vec<Triangle> {
     let [a, b, c, d] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
-    let mut triangles = vec![transformed(to_world, [a, b, c]), transformed(to_world, [a, c, d])];
-    if to_world.determinant() < 0.0 {
-        for triangle in &mut triangles {
-            triangle.vertices.swap(1, 2);
-        }
-    }
-    triangles
+    vec![transformed(to_world, [a, b, c]), transformed(to_world, [a, c, d])]
 }
 
 /// A Wavefront OBJ file, all its groups as one mesh.

@@ -277,6 +277,16 @@ fn cube_and_rectangle_face_outward() {
 }
 
 #[test]
+fn a_mirrored_boundary_follows_its_winding() {
+    let fog = format!("{FOG}{}", fog_cube(-1.0, ""));
+    let away = "<transform name='to_world'><translate z='-5'/></transform>";
+    let scene = load_with(&with_sensor(&fog, away), &[], &[]).unwrap();
+    assert!(scene.boundaries[0].triangles.iter().all(|t| t.area_normal().dot(t.vertices_f64()[0]) < 0.0));
+    let scene = load("<shape type='cube'><transform name='to_world'><scale value='-1'/></transform></shape>");
+    assert!(scene.surfaces[0].triangles.iter().all(|t| t.area_normal().dot(t.vertices_f64()[0]) > 0.0));
+}
+
+#[test]
 fn obj_files_are_read_or_refused_by_name() {
     let text = scene("<shape type='obj'><string name='filename' value='m.obj'/></shape>");
     let v = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
