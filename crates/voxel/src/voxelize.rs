@@ -65,7 +65,8 @@ fn add_triangle(
     else {
         return Ok(());
     };
-    if x.start() == x.end() && y.start() == y.end() && z.start() == z.end() {
+    // The triangle is inside one voxel. (Not: only one voxel is left after clipping; that one it may miss.)
+    if (min - dilation).floor() == (max + dilation).floor() {
         bits.insert([*x.start(), *y.start(), *z.start()]);
         return Ok(());
     }
