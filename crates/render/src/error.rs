@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// Why a scene could not be loaded or rendered.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
     /// A scene file says something that is wrong or not supported.
@@ -38,6 +38,25 @@ pub enum RenderError {
         /// How to mend it; may be empty.
         help: String,
     },
+    /// An option of the render is out of range.
+    #[error("--{option} {message}")]
+    Option {
+        /// Name of the option on the command line.
+        option: &'static str,
+        /// What it has to be.
+        message: String,
+    },
+    /// Two images that should be compared differ in size.
+    #[error("the images differ in size: {} x {} and {} x {}", a[0], a[1], b[0], b[1])]
+    SizeMismatch {
+        /// Width and height of the one.
+        a: [u32; 2],
+        /// Width and height of the other.
+        b: [u32; 2],
+    },
+    /// An image could not be read or written.
+    #[error(transparent)]
+    Image(#[from] crate::ImageError),
     /// The voxel size does not fit the scene.
     #[error(transparent)]
     Voxel(#[from] vdf_voxel::VoxelError),

@@ -4,30 +4,42 @@
 //! distance field, safe neighbourhoods: the proofs) → an integrator, tile by tile → an image and its statistics.
 
 mod acceleration;
+mod atomic_file;
 mod error;
 mod frame;
 pub mod geometry;
+mod image;
+mod image_io;
 mod integrator;
 mod lights;
 mod media;
 mod mesh;
+mod method;
+mod metrics;
+mod options;
 mod phase;
 mod render;
 mod sampler;
 pub mod scene;
 mod sensor;
-mod shim;
-pub use shim::*;
+mod statistics;
 mod visibility;
 mod world;
 
 pub use acceleration::{Acceleration, BuildReport};
 pub use lights::{LightSample, Lights};
 pub use media::{Flight, Media};
+pub use atomic_file::{check_writable, write_atomically};
 pub use error::RenderError;
+pub use image::Image;
+pub use image_io::{AttributeValue, ImageError, read_exr, write_exr, write_png};
 pub use mesh::Triangle;
-pub use render::render;
+pub use method::{Method, UnknownMethod};
+pub use metrics::{Comparison, compare};
+pub use options::{IntegratorKind, Progress, RenderOptions};
+pub use render::{Rendering, render};
 pub use sampler::Sampler;
+pub use statistics::{NeighbourhoodSize, Statistics};
 pub use visibility::{Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, Proofs, ShadowQuery, Visibility};
 pub use world::{SurfacePoint, World};
 

@@ -8,14 +8,24 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::{
-    Acceleration, Image, IntegratorKind, Progress, RenderError, RenderOptions, Rendering, Rgb, Sampler, World,
+    Acceleration, Image, IntegratorKind, Progress, RenderError, RenderOptions, Rgb, Sampler, Statistics, World,
     integrator::{Integrator, PathRay},
     scene::{PixelRect, Scene},
+    statistics::Record,
     visibility::{Counters, Proofs, Visibility},
 };
 
 /// Side of a tile in pixels. Only progress and cancellation see tiles.
 const TILE: u32 = 16;
+
+/// A finished render.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// The image.
+    pub image: Image,
+    /// Its figures.
+    pub statistics: Statistics,
+}
 
 /// Renders `scene`.
 ///
@@ -35,7 +45,7 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
     progress.phase("hierarchy");
     let start = Instant::now();
     let world = World::new(scene);
-    let bvh_seconds = start.elapsed().as_secs_f64();
+    let t_hierarchy = start.elapsed().as_secs_f64();
 
     progress.phase("distance field");
     let voxel_size = options.voxel_size.unwrap_or_else(|| {
@@ -69,10 +79,20 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
         Acceleration::NdfSn(p) => job.run(p, progress),
         Acceleration::AmrSn(p) => job.run(p, progress),
     }?;
-    let render_seconds = start.elapsed().as_secs_f64();
-    let (width, height) = job.size();
-    let image = Image { width, height, pixels };
-    let statistics = crate::Statistics::new(scene, options, &build, &counters, bvh_seconds, render_seconds);
+    let mut image = Image::cropped([scene.film.width, scene.film.height], job.crop);
+    image.pixels = pixels;
+    let statistics = Statistics::new(&Record {
+        scene,
+        options,
+        build: &build,
+        counters: &counters,
+        t_hierarchy,
+        t_render: start.elapsed().as_secs_f64(),
+        size: [image.width, image.height],
+        spp: job.spp,
+        seed: job.seed,
+        triangles: world.triangles.len(),
+    });
     Ok(Rendering { image, statistics })
 }
 

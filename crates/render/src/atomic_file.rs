@@ -1,0 +1,113 @@
+//! Files that appear whole or not at all.
+//!
+//! The content goes to a temporary file in the same directory, is flushed to the device, and is then renamed. A crash,
+//! a full disk or an interrupt leaves the directory as it was.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use tempfile::{Builder, NamedTempFile};
+
+/// Writes a file with `write` and moves it to `path`; an existing file is replaced.
+///
+/// A device or a pipe at `path` is written directly: to rename over it would destroy it.
+///
+/// # Errors
+/// What the system says; then nothing new is left behind.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    if is_special(path) {
+        let mut out = BufWriter::new(OpenOptions::new().write(true).open(path)?);
+        write(&mut out)?;
+        return out.flush();
+    }
+    let mut out = BufWriter::new(temporary_beside(path)?);
+    write(&mut out)?;
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    // Some file systems report a full disk only here.
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}
+
+/// Tells, without leaving a trace, whether [`write_atomically`] could write `path` now.
+///
+/// # Errors
+/// What the system says.
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    if path.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a directory"));
+    }
+    if is_special(path) {
+        return OpenOptions::new().write(true).open(path).map(drop);
+    }
+    temporary_beside(path).map(drop)
+}
+
+/// True if there is something at `path` that is neither a regular file nor a directory.
+fn is_special(path: &Path) -> bool {
+    path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+}
+
+fn temporary_beside(path: &Path) -> io::Result<NamedTempFile<File>> {
+    let directory = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = Builder::new();
+    builder.prefix(".vdf-").suffix(".tmp");
+    // A temporary file is private by default, the result should be as readable as any other new file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(directory).map_err(|error| {
+        // tempfile appends the temporary name, which means nothing to the user.
+        let kind = error.kind();
+        match error.raw_os_error() {
+            Some(code) => io::Error::from_raw_os_error(code),
+            None => kind.into(),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(directory).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_failed_write_keeps_the_old_file_and_nothing_else() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.txt");
+        write_atomically(&path, |out| out.write_all(b"old")).unwrap();
+        let result = write_atomically(&path, |out| {
+            out.write_all(b"new")?;
+            Err(io::Error::other("stop"))
+        });
+        assert!(result.is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(directory.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn checking_leaves_no_trace() {
+        let directory = tempfile::tempdir().unwrap();
+        check_writable(&directory.path().join("a.txt")).unwrap();
+        assert!(names(directory.path()).is_empty());
+        assert!(check_writable(directory.path()).is_err());
+        let error = check_writable(&directory.path().join("missing/a.txt")).unwrap_err();
+        assert!(!error.to_string().contains(".vdf-"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_not_replaced() {
+        let device = Path::new("/dev/full");
+        let error = write_atomically(device, |out| out.write_all(b"x")).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+        assert!(!device.metadata().unwrap().is_file());
+    }
+}

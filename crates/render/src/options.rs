@@ -1,0 +1,102 @@
+//! What a render can be asked for beyond the scene file, and how it reports while it runs.
+
+use crate::{
+    Method, RenderError,
+    scene::{PixelRect, Scene},
+};
+
+/// The estimator of light transport.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntegratorKind {
+    /// Volumetric path tracing (Sec. 2.3 in [Houska2013]): any number of scattering events.
+    Volpath,
+    /// Ray marching (Sec. 2.5): the medium scatters once.
+    Raymarch {
+        /// Samples on each path segment, at least 1.
+        samples_per_segment: u32,
+    },
+}
+
+/// Options of [`crate::render()`]; `None` leaves it to the scene or to the default named.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Method of acceleration.
+    pub method: Method,
+    /// Side of a voxel in world units; by default a 128th of the scene's longest side.
+    pub voxel_size: Option<f64>,
+    /// Integrator.
+    pub integrator: IntegratorKind,
+    /// Samples per pixel; by default the scene's.
+    pub spp: Option<u32>,
+    /// Seed of the random numbers; by default the scene's.
+    pub seed: Option<u64>,
+    /// Number of threads; by default one for each processor.
+    pub threads: Option<usize>,
+    /// Part of the full film to render; by default the scene's.
+    pub crop: Option<PixelRect>,
+    /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
+    pub max_voxels: u64,
+}
+
+impl Default for RenderOptions {
+    /// `volpath` with `amr-sn`, at most 2²⁹ voxels (4 GiB), all else from the scene.
+    fn default() -> Self {
+        Self {
+            method: Method::AmrSn,
+            voxel_size: None,
+            integrator: IntegratorKind::Volpath,
+            spp: None,
+            seed: None,
+            threads: None,
+            crop: None,
+            max_voxels: 1 << 29,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// Checks what can be checked before anything is built.
+    ///
+    /// # Errors
+    /// [`RenderError::Option`] names the option and what it has to be.
+    pub fn validate(&self, scene: &Scene) -> Result<(), RenderError> {
+        let fail = |option: &'static str, message: String| Err(RenderError::Option { option, message });
+        if self.spp == Some(0) {
+            return fail("spp", "must be at least 1".into());
+        }
+        if self.threads == Some(0) {
+            return fail("threads", "must be at least 1".into());
+        }
+        if let Some(size) = self.voxel_size
+            && !(size.is_finite() && size > 0.0)
+        {
+            return fail("voxel", format!("must be a positive finite number, not {size}"));
+        }
+        if self.integrator == (IntegratorKind::Raymarch { samples_per_segment: 0 }) {
+            return fail("samples-per-segment", "must be at least 1".into());
+        }
+        if let Some(c) = self.crop {
+            let (width, height) = (scene.film.width, scene.film.height);
+            if !(c.x0 < c.x1 && c.y0 < c.y1 && c.x1 <= width && c.y1 <= height) {
+                let message = format!(
+                    "{},{},{},{} must be x0,y0,x1,y1 with 0 ≤ x0 < x1 ≤ {width} and 0 ≤ y0 < y1 ≤ {height}, the size of the film",
+                    c.x0, c.y0, c.x1, c.y1
+                );
+                return fail("crop", message);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Is told how a render goes on, from any thread, and may stop it.
+pub trait Progress: Sync {
+    /// A new phase of the render begins.
+    fn phase(&self, name: &str);
+    /// How many pixels there are to render.
+    fn pixels_total(&self, n: u64);
+    /// `n` more pixels are rendered.
+    fn pixels_done(&self, n: u64);
+    /// Whether to stop; asked between tiles.
+    fn cancelled(&self) -> bool;
+}
