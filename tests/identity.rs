@@ -21,9 +21,17 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
             for method in all_methods() {
                 for voxel_size in [4.0, 8.0, 16.0, 100.0] {
                     for threads in [1, 2] {
-                        let o = RenderOptions { method, voxel_size: Some(voxel_size), threads: Some(threads), ..base.clone() };
+                        let o = RenderOptions {
+                            method,
+                            voxel_size: Some(voxel_size),
+                            threads: Some(threads),
+                            ..base.clone()
+                        };
                         let r = rendered(&scene, &o);
-                        assert!(r.statistics.proved > 0 || voxel_size == 100.0, "{name} {method} {voxel_size}: nothing proved");
+                        assert!(
+                            r.statistics.proved > 0 || voxel_size == 100.0,
+                            "{name} {method} {voxel_size}: nothing proved"
+                        );
                         assert!(
                             bits(&r.image.pixels) == bits(&reference.image.pixels),
                             "{name} {integrator:?} {method} voxel {voxel_size} threads {threads} differs from none"
@@ -39,7 +47,11 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
 fn a_crop_is_a_part_of_the_whole() {
     let scene = builtin("cbox_vol2", &[("width", "40"), ("height", "36"), ("spp", "2")]);
     let whole = rendered(&scene, &options()).image;
-    for crop in [PixelRect { x0: 0, y0: 0, x1: 40, y1: 36 }, PixelRect { x0: 7, y0: 17, x1: 33, y1: 20 }, PixelRect { x0: 39, y0: 35, x1: 40, y1: 36 }] {
+    for crop in [
+        PixelRect { x0: 0, y0: 0, x1: 40, y1: 36 },
+        PixelRect { x0: 7, y0: 17, x1: 33, y1: 20 },
+        PixelRect { x0: 39, y0: 35, x1: 40, y1: 36 },
+    ] {
         let part = rendered(&scene, &RenderOptions { crop: Some(crop), ..options() }).image;
         let mut expected = Vec::new();
         for y in crop.y0..crop.y1 {

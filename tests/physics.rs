@@ -107,7 +107,8 @@ fn single_scattering_is_the_airlight_integral() {
                 add_fog(&mut scene, vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.0, 4.0), fog);
             }
             scene.integrator = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
-            let expected = airlight(0.7, f64::from(0.8_f32), phase, light, 3.0, (0.0, if bounded { 4.0 } else { 60.0 }));
+            let expected =
+                airlight(0.7, f64::from(0.8_f32), phase, light, 3.0, (0.0, if bounded { 4.0 } else { 60.0 }));
             for integrator in [IntegratorKind::Volpath, RAYMARCH] {
                 let o = vdf::render::RenderOptions { integrator, ..options() };
                 let name = format!("{phase:?}, bounded: {bounded}, {integrator:?}");

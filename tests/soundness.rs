@@ -119,7 +119,13 @@ fn count() -> u32 {
 }
 
 /// Asks the method about each segment; returns proofs made and proofs wrong.
-fn check(acceleration: &Acceleration, generator: &Generator, emitters: &[Emitter], segments: u32, seed: u64) -> (u64, u64) {
+fn check(
+    acceleration: &Acceleration,
+    generator: &Generator,
+    emitters: &[Emitter],
+    segments: u32,
+    seed: u64,
+) -> (u64, u64) {
     match acceleration {
         Acceleration::None(p) => check_proofs(p, generator, emitters, segments, seed),
         Acceleration::Ndf(p) => check_proofs(p, generator, emitters, segments, seed),
@@ -129,14 +135,24 @@ fn check(acceleration: &Acceleration, generator: &Generator, emitters: &[Emitter
     }
 }
 
-fn check_proofs<P: Proofs>(proofs: &P, generator: &Generator, emitters: &[Emitter], segments: u32, seed: u64) -> (u64, u64) {
+fn check_proofs<P: Proofs>(
+    proofs: &P,
+    generator: &Generator,
+    emitters: &[Emitter],
+    segments: u32,
+    seed: u64,
+) -> (u64, u64) {
     (0..segments)
         .into_par_iter()
         .map(|i| {
             let segment = generator.segment(&mut Sampler::new(seed, i, 0, 0));
             // A neighbourhood may only be asked about segments that end in its light; all others go to the field.
             let light = |e: &Emitter| matches!(e, Emitter::Point { position, .. } if *position == segment.q);
-            let Some(emitter) = emitters.iter().position(light).or_else(|| emitters.iter().position(|e| matches!(e, Emitter::Constant { .. }))) else {
+            let Some(emitter) = emitters
+                .iter()
+                .position(light)
+                .or_else(|| emitters.iter().position(|e| matches!(e, Emitter::Constant { .. })))
+            else {
                 return (0, 0);
             };
             if proofs.answer(emitter, segment.p, segment.q) != Answer::Unoccluded {
@@ -159,14 +175,19 @@ fn no_proof_is_wrong() {
         // A last emitter without a neighbourhood, through which segments between any two points are asked.
         scene.emitters.push(Emitter::Constant { radiance: glam::Vec3::ONE });
         let world = World::new(&scene);
-        let lights = scene.emitters.iter().filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
+        let lights = scene
+            .emitters
+            .iter()
+            .filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
         let lights: Vec<DVec3> = lights.collect();
-        let configurations: Vec<_> = all_methods().into_iter().flat_map(|m| [4.0, 8.0, 16.0, 100.0].map(|s| (m, s))).collect();
+        let configurations: Vec<_> =
+            all_methods().into_iter().flat_map(|m| [4.0, 8.0, 16.0, 100.0].map(|s| (m, s))).collect();
         let share = count() / u32::try_from(configurations.len()).expect("few") + 1;
         let (mut proofs, mut asked) = (0, 0);
         for (k, (method, size)) in configurations.into_iter().enumerate() {
             let (acceleration, _) =
-                Acceleration::build(method, &world.triangles, world.bounds, &scene.emitters, size, 1 << 30).expect("a sound grid");
+                Acceleration::build(method, &world.triangles, world.bounds, &scene.emitters, size, 1 << 30)
+                    .expect("a sound grid");
             let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, size, 1 << 30).expect("a sound grid");
             let generator = Generator { world: &world, lights: lights.clone(), grid };
             let (made, wrong) = check(&acceleration, &generator, &scene.emitters, share, k as u64);

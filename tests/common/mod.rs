@@ -114,7 +114,17 @@ pub fn integrate(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
         h / 6.0 * (fa + 4.0 * fm + fb)
     }
     #[allow(clippy::too_many_arguments, reason = "the values of the whole interval are passed down")]
-    fn refine(f: &dyn Fn(f64) -> f64, a: f64, b: f64, fa: f64, fm: f64, fb: f64, whole: f64, tol: f64, depth: u32) -> f64 {
+    fn refine(
+        f: &dyn Fn(f64) -> f64,
+        a: f64,
+        b: f64,
+        fa: f64,
+        fm: f64,
+        fb: f64,
+        whole: f64,
+        tol: f64,
+        depth: u32,
+    ) -> f64 {
         let m = 0.5 * (a + b);
         let (fl, fr) = (f(0.5 * (a + m)), f(0.5 * (m + b)));
         let (left, right) = (simpson(fa, fl, fm, m - a), simpson(fm, fr, fb, b - m));
@@ -122,7 +132,8 @@ pub fn integrate(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
         if depth == 0 || delta.abs() <= 15.0 * tol {
             return left + right + delta / 15.0;
         }
-        refine(f, a, m, fa, fl, fm, left, 0.5 * tol, depth - 1) + refine(f, m, b, fm, fr, fb, right, 0.5 * tol, depth - 1)
+        refine(f, a, m, fa, fl, fm, left, 0.5 * tol, depth - 1)
+            + refine(f, m, b, fm, fr, fb, right, 0.5 * tol, depth - 1)
     }
     // Pieces first, so that a narrow peak is not overlooked.
     let pieces = 256;

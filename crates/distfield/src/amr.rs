@@ -46,10 +46,7 @@ impl Amr {
             .par_chunks_exact_mut(resolution.voxel_count())
             .enumerate()
             .for_each(|(octant, plane)| sweep(occupied, octant, plane));
-        Self {
-            resolution,
-            distances,
-        }
+        Self { resolution, distances }
     }
 
     /// The distance to the nearest occupied voxel in an octant, at most 255. The voxel must be one of the grid's.
@@ -66,12 +63,9 @@ impl Amr {
     #[inline(never)]
     fn proves_tie(&self, a: Voxel, b: Voxel, ties: usize, distance: u32) -> bool {
         let octant = octant_of(a, b);
-        (0..8)
-            .filter(|other| (other ^ octant) & !ties == 0)
-            .any(|other| {
-                distance < u32::from(self.distance(other, a))
-                    || distance < u32::from(self.distance(other ^ 7, b))
-            })
+        (0..8).filter(|other| (other ^ octant) & !ties == 0).any(|other| {
+            distance < u32::from(self.distance(other, a)) || distance < u32::from(self.distance(other ^ 7, b))
+        })
     }
 }
 
@@ -80,9 +74,7 @@ impl SafeZones for Amr {
     fn proves(&self, a: Voxel, b: Voxel) -> bool {
         let distance = chessboard_distance(a, b);
         let octant = octant_of(a, b);
-        if distance < u32::from(self.distance(octant, a))
-            || distance < u32::from(self.distance(octant ^ 7, b))
-        {
+        if distance < u32::from(self.distance(octant, a)) || distance < u32::from(self.distance(octant ^ 7, b)) {
             return true;
         }
         let ties = number(a.i == b.i, a.j == b.j, a.k == b.k);
@@ -119,18 +111,10 @@ fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
     let mut nearest = vec![0; width];
     let mut widened = vec![0; width];
     for step_k in 0..z {
-        let k = if octant & MINUS_Z == 0 {
-            z - 1 - step_k
-        } else {
-            step_k
-        };
+        let k = if octant & MINUS_Z == 0 { z - 1 - step_k } else { step_k };
         let next_k = (step_k > 0).then(|| if octant & MINUS_Z == 0 { k + 1 } else { k - 1 });
         for step_j in 0..y {
-            let j = if octant & MINUS_Y == 0 {
-                y - 1 - step_j
-            } else {
-                step_j
-            };
+            let j = if octant & MINUS_Y == 0 { y - 1 - step_j } else { step_j };
             let next_j = (step_j > 0).then(|| if octant & MINUS_Y == 0 { j + 1 } else { j - 1 });
             let row = |j: Option<u32>, k: Option<u32>| match (j, k) {
                 (Some(j), Some(k)) => {

@@ -43,10 +43,7 @@ impl Ndf {
             let (done, rest) = distances.split_at_mut(row * width);
             nearest.clear();
             let j = row % height;
-            let finished = |back: usize| {
-                row.checked_sub(back)
-                    .and_then(|r| done.chunks_exact(width).nth(r))
-            };
+            let finished = |back: usize| row.checked_sub(back).and_then(|r| done.chunks_exact(width).nth(r));
             nearest.add(finished(1).filter(|_| j > 0));
             nearest.add(finished(height + 1).filter(|_| j > 0));
             nearest.add(finished(height));
@@ -63,20 +60,12 @@ impl Ndf {
             nearest.add(finished(1).filter(|_| j + 1 < height));
             nearest.add(finished(height + 1).filter(|_| j + 1 < height));
             nearest.add(finished(height));
-            nearest.add(
-                (height > 1)
-                    .then(|| finished(height - 1))
-                    .flatten()
-                    .filter(|_| j > 0),
-            );
+            nearest.add((height > 1).then(|| finished(height - 1)).flatten().filter(|_| j > 0));
             let current = &mut rest[row * width..];
             nearest.relax(current);
             rows::sweep_down(current);
         }
-        Self {
-            resolution,
-            distances,
-        }
+        Self { resolution, distances }
     }
 
     /// The distance of a voxel from the nearest occupied one, at most 255. The voxel must be one of the grid's.
@@ -84,10 +73,7 @@ impl Ndf {
     #[inline]
     pub fn distance(&self, voxel: Voxel) -> u8 {
         debug_assert!(self.resolution.contains(voxel));
-        self.distances
-            .get(self.resolution.linear_index(voxel))
-            .copied()
-            .unwrap_or(0)
+        self.distances.get(self.resolution.linear_index(voxel)).copied().unwrap_or(0)
     }
 }
 
@@ -115,10 +101,7 @@ struct Nearest {
 
 impl Nearest {
     fn new(width: usize) -> Self {
-        Self {
-            rows: vec![rows::FAR; width],
-            widened: vec![rows::FAR; width],
-        }
+        Self { rows: vec![rows::FAR; width], widened: vec![rows::FAR; width] }
     }
 
     fn clear(&mut self) {

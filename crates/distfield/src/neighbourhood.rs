@@ -28,9 +28,7 @@ impl SafeNeighbourhood {
     pub fn new<F: SafeZones>(field: &F, occupied: &VoxelSet, light: Voxel) -> Self {
         let resolution = field.resolution();
         if occupied.contains(light) || !resolution.contains(light) {
-            return Self {
-                voxels: VoxelSet::new(resolution),
-            };
+            return Self { voxels: VoxelSet::new(resolution) };
         }
         let voxels = VoxelSet::from_rows(resolution, |j, k, row| {
             for (word, first) in row.iter_mut().zip((0..resolution.x).step_by(64)) {

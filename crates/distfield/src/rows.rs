@@ -11,10 +11,7 @@ pub(crate) fn expand(words: &[u64], row: &mut [u8]) {
     for (bytes, &word) in row.chunks_mut(64).zip(words) {
         match word {
             0 => bytes.fill(FAR),
-            _ => bytes
-                .iter_mut()
-                .enumerate()
-                .for_each(|(bit, byte)| *byte = ((word >> bit) as u8 & 1).wrapping_sub(1)),
+            _ => bytes.iter_mut().enumerate().for_each(|(bit, byte)| *byte = ((word >> bit) as u8 & 1).wrapping_sub(1)),
         }
     }
 }

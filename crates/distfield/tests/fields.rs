@@ -6,10 +6,7 @@ use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 /// The distance to the nearest occupied voxel for which `admits` holds, saturated like the fields.
 fn nearest(occupied: &[Voxel], from: Voxel, admits: impl Fn(Voxel) -> bool) -> u8 {
-    let distances = occupied
-        .iter()
-        .filter(|&&u| admits(u))
-        .map(|&u| chessboard_distance(from, u));
+    let distances = occupied.iter().filter(|&&u| admits(u)).map(|&u| chessboard_distance(from, u));
     distances.min().map_or(255, |d| d.min(255) as u8)
 }
 
@@ -33,11 +30,7 @@ fn check_values(occupied: &VoxelSet) {
         assert_eq!(ndf.distance(v), nearest(&list, v, |_| true), "ndf at {v:?}");
         for octant in 0..8 {
             let expected = nearest(&list, v, |u| in_octant(octant, v, u));
-            assert_eq!(
-                amr.distance(octant, v),
-                expected,
-                "amr at {v:?}, octant {octant}"
-            );
+            assert_eq!(amr.distance(octant, v), expected, "amr at {v:?}, octant {octant}");
         }
     }
 }
@@ -49,50 +42,22 @@ fn check_proofs(occupied: &VoxelSet, chosen: &[Voxel]) {
     let safe_ndf = |a, b| chessboard_distance(a, b) < u32::from(nearest(&list, a, |_| true));
     let safe_amr = |a, b| {
         let octants = (0..8).filter(|&octant| in_octant(octant, a, b));
-        octants.into_iter().any(|octant| {
-            chessboard_distance(a, b) < u32::from(nearest(&list, a, |u| in_octant(octant, a, u)))
-        })
+        octants
+            .into_iter()
+            .any(|octant| chessboard_distance(a, b) < u32::from(nearest(&list, a, |u| in_octant(octant, a, u))))
     };
     for &a in chosen {
-        let near = [
-            SafeNeighbourhood::new(&ndf, occupied, a),
-            SafeNeighbourhood::new(&amr, occupied, a),
-        ];
+        let near = [SafeNeighbourhood::new(&ndf, occupied, a), SafeNeighbourhood::new(&amr, occupied, a)];
         let mut counts = [0, 0];
         for b in occupied.resolution().voxels() {
             let proofs = [ndf.proves(a, b), amr.proves(a, b)];
-            assert_eq!(
-                proofs[0],
-                safe_ndf(a, b) || safe_ndf(b, a),
-                "ndf {a:?} {b:?}"
-            );
-            assert_eq!(
-                proofs[1],
-                safe_amr(a, b) || safe_amr(b, a),
-                "amr {a:?} {b:?}"
-            );
-            assert_eq!(
-                proofs,
-                [ndf.proves(b, a), amr.proves(b, a)],
-                "symmetry {a:?} {b:?}"
-            );
-            assert_eq!(
-                proofs,
-                [near[0].proves(b), near[1].proves(b)],
-                "neighbourhood {a:?} {b:?}"
-            );
-            assert!(
-                !(proofs[0] || proofs[1]) || cuboid_is_free(occupied, a, b),
-                "unsound: {a:?} {b:?}"
-            );
-            assert!(
-                proofs[1] || !proofs[0],
-                "amr proves whatever ndf does: {a:?} {b:?}"
-            );
-            counts = [
-                counts[0] + usize::from(proofs[0]),
-                counts[1] + usize::from(proofs[1]),
-            ];
+            assert_eq!(proofs[0], safe_ndf(a, b) || safe_ndf(b, a), "ndf {a:?} {b:?}");
+            assert_eq!(proofs[1], safe_amr(a, b) || safe_amr(b, a), "amr {a:?} {b:?}");
+            assert_eq!(proofs, [ndf.proves(b, a), amr.proves(b, a)], "symmetry {a:?} {b:?}");
+            assert_eq!(proofs, [near[0].proves(b), near[1].proves(b)], "neighbourhood {a:?} {b:?}");
+            assert!(!(proofs[0] || proofs[1]) || cuboid_is_free(occupied, a, b), "unsound: {a:?} {b:?}");
+            assert!(proofs[1] || !proofs[0], "amr proves whatever ndf does: {a:?} {b:?}");
+            counts = [counts[0] + usize::from(proofs[0]), counts[1] + usize::from(proofs[1])];
         }
         assert_eq!(counts, [near[0].count(), near[1].count()]);
     }
@@ -130,16 +95,9 @@ fn scene() -> impl Strategy<Value = (VoxelSet, Vec<Voxel>)> {
     (shapes(), count, indices(6)).prop_map(|(resolution, occupied, chosen)| {
         let at = |index: prop::sample::Index| {
             let n = index.index(resolution.voxel_count()) as u32;
-            Voxel::new(
-                n % resolution.x,
-                n / resolution.x % resolution.y,
-                n / (resolution.x * resolution.y),
-            )
+            Voxel::new(n % resolution.x, n / resolution.x % resolution.y, n / (resolution.x * resolution.y))
         };
-        (
-            set(resolution, occupied.into_iter().map(at)),
-            chosen.into_iter().map(at).collect(),
-        )
+        (set(resolution, occupied.into_iter().map(at)), chosen.into_iter().map(at).collect())
     })
 }
 
@@ -158,20 +116,11 @@ fn empty_and_full_grids() {
     for shape in [(1, 1, 1), (5, 4, 3), (65, 2, 2)] {
         let resolution = Resolution::new(shape.0, shape.1, shape.2);
         let corners = [Voxel::new(0, 0, 0), resolution.last()];
-        for occupied in [
-            VoxelSet::new(resolution),
-            set(resolution, resolution.voxels()),
-        ] {
+        for occupied in [VoxelSet::new(resolution), set(resolution, resolution.voxels())] {
             check_values(&occupied);
             check_proofs(&occupied, &corners);
-            assert_eq!(
-                Amr::build(&occupied).proves(corners[0], corners[1]),
-                occupied.is_empty()
-            );
-            assert_eq!(
-                Ndf::build(&occupied).proves(corners[0], corners[1]),
-                occupied.is_empty()
-            );
+            assert_eq!(Amr::build(&occupied).proves(corners[0], corners[1]), occupied.is_empty());
+            assert_eq!(Ndf::build(&occupied).proves(corners[0], corners[1]), occupied.is_empty());
         }
     }
 }
@@ -183,14 +132,7 @@ fn one_voxel_in_each_corner() {
     let last = resolution.last();
     for corner in 0..8 {
         let pick = |bit: u32, c: u32| if corner & bit == 0 { 0 } else { c };
-        let occupied = set(
-            resolution,
-            [Voxel::new(
-                pick(1, last.i),
-                pick(2, last.j),
-                pick(4, last.k),
-            )],
-        );
+        let occupied = set(resolution, [Voxel::new(pick(1, last.i), pick(2, last.j), pick(4, last.k))]);
         check_values(&occupied);
         check_proofs(&occupied, &all);
     }
@@ -212,16 +154,10 @@ fn long_corridors_saturate() {
             let [i, j, k] = along(n, 0);
             Voxel::new(i, j, k)
         };
-        check_proofs(
-            &occupied,
-            &[at(0), at(340), at(345), at(346), at(600), at(699)],
-        );
+        check_proofs(&occupied, &[at(0), at(340), at(345), at(346), at(600), at(699)]);
         let amr = Amr::build(&occupied);
         assert!(amr.proves(at(10), at(264)), "254 voxels apart");
-        assert!(
-            !amr.proves(at(10), at(265)),
-            "255 voxels apart: a saturated distance must not say so"
-        );
+        assert!(!amr.proves(at(10), at(265)), "255 voxels apart: a saturated distance must not say so");
     }
 }
 
@@ -253,19 +189,11 @@ fn speed() {
             start.elapsed().as_secs_f64()
         });
         let best = seconds.fold(f64::INFINITY, f64::min);
-        println!(
-            "{name}: {:.1} ms, {:.0} M voxels/s",
-            best * 1e3,
-            voxels / best * 1e-6
-        );
+        println!("{name}: {:.1} ms, {:.0} M voxels/s", best * 1e3, voxels / best * 1e-6);
     };
     time("ndf", &|| drop(std::hint::black_box(Ndf::build(&occupied))));
     time("amr", &|| drop(std::hint::black_box(Amr::build(&occupied))));
     let amr = Amr::build(&occupied);
     let light = Voxel::new(39, 124, 232);
-    time("amr-sn", &|| {
-        drop(std::hint::black_box(SafeNeighbourhood::new(
-            &amr, &occupied, light,
-        )))
-    });
+    time("amr-sn", &|| drop(std::hint::black_box(SafeNeighbourhood::new(&amr, &occupied, light))));
 }

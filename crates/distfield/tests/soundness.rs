@@ -11,11 +11,7 @@ fn sign(x: f64) -> i8 {
 }
 
 fn side3(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i8 {
-    let at = |p: DVec3| Coord3D {
-        x: p.x,
-        y: p.y,
-        z: p.z,
-    };
+    let at = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
     sign(orient3d(at(a), at(b), at(c), at(d)))
 }
 
@@ -29,8 +25,7 @@ fn same_side(signs: [i8; 3]) -> bool {
 }
 
 fn segments_meet(p: [f64; 2], q: [f64; 2], a: [f64; 2], b: [f64; 2]) -> bool {
-    let boxes =
-        (0..2).all(|i| p[i].min(q[i]) <= a[i].max(b[i]) && a[i].min(b[i]) <= p[i].max(q[i]));
+    let boxes = (0..2).all(|i| p[i].min(q[i]) <= a[i].max(b[i]) && a[i].min(b[i]) <= p[i].max(q[i]));
     boxes && side2(p, q, a) * side2(p, q, b) <= 0 && side2(a, b, p) * side2(a, b, q) <= 0
 }
 
@@ -65,54 +60,30 @@ fn the_exact_test_is_right() {
     let v = DVec3::new;
     let t = [v(0.0, 0.0, 0.0), v(4.0, 0.0, 0.0), v(0.0, 4.0, 0.0)];
     assert!(hits(v(1.0, 1.0, -1.0), v(1.0, 1.0, 1.0), t));
-    assert!(
-        hits(v(1.0, 1.0, 0.0), v(1.0, 1.0, 1.0), t),
-        "touches with an end"
-    );
-    assert!(
-        hits(v(2.0, 2.0, -1.0), v(2.0, 2.0, 1.0), t),
-        "through an edge"
-    );
-    assert!(
-        hits(v(4.0, 0.0, 1.0), v(4.0, 0.0, -1.0), t),
-        "through a vertex"
-    );
+    assert!(hits(v(1.0, 1.0, 0.0), v(1.0, 1.0, 1.0), t), "touches with an end");
+    assert!(hits(v(2.0, 2.0, -1.0), v(2.0, 2.0, 1.0), t), "through an edge");
+    assert!(hits(v(4.0, 0.0, 1.0), v(4.0, 0.0, -1.0), t), "through a vertex");
     assert!(!hits(v(1.0, 1.0, 0.1), v(1.0, 1.0, 1.0), t), "ends before");
     assert!(!hits(v(2.1, 2.1, -1.0), v(2.1, 2.1, 1.0), t), "misses");
     assert!(hits(v(-1.0, 1.0, 0.0), v(9.0, 1.0, 0.0), t), "in the plane");
-    assert!(
-        !hits(v(3.0, 3.0, 0.0), v(9.0, 1.0, 0.0), t),
-        "in the plane, but beside"
-    );
+    assert!(!hits(v(3.0, 3.0, 0.0), v(9.0, 1.0, 0.0), t), "in the plane, but beside");
     let line = [v(0.0, 0.0, 0.0), v(2.0, 2.0, 2.0), v(4.0, 4.0, 4.0)];
-    assert!(
-        hits(v(3.0, 3.0, 0.0), v(3.0, 3.0, 9.0), line)
-            && !hits(v(3.0, 3.1, 0.0), v(3.0, 3.1, 9.0), line)
-    );
+    assert!(hits(v(3.0, 3.0, 0.0), v(3.0, 3.0, 9.0), line) && !hits(v(3.0, 3.1, 0.0), v(3.0, 3.1, 9.0), line));
     let point = [v(1.0, 1.0, 1.0); 3];
-    assert!(
-        hits(v(0.0, 0.0, 0.0), v(2.0, 2.0, 2.0), point)
-            && !hits(v(0.0, 0.0, 0.0), v(0.5, 0.5, 0.5), point)
-    );
+    assert!(hits(v(0.0, 0.0, 0.0), v(2.0, 2.0, 2.0), point) && !hits(v(0.0, 0.0, 0.0), v(0.5, 0.5, 0.5), point));
 }
 
 /// The scene is within 0…SIDE on each axis, and many coordinates are whole: they are faces of voxels for most sizes.
 const SIDE: i32 = 42;
 
 fn vertex() -> impl Strategy<Value = [f32; 3]> {
-    let whole = prop_oneof![
-        0..=SIDE,
-        (0..=14).prop_map(|c| 3 * c),
-        (0..=8).prop_map(|c| 5 * c)
-    ]
-    .prop_map(|c| c as f32);
+    let whole = prop_oneof![0..=SIDE, (0..=14).prop_map(|c| 3 * c), (0..=8).prop_map(|c| 5 * c)].prop_map(|c| c as f32);
     prop::array::uniform3(prop_oneof![4 => whole, 1 => 0f32..42.0, 1 => Just(-0.0)])
 }
 
 fn triangle() -> impl Strategy<Value = [[f32; 3]; 3]> {
     let near = || prop::array::uniform3(-4..=4i32);
-    let plus =
-        |a: [f32; 3], d: [i32; 3]| [0, 1, 2].map(|i| (a[i] + d[i] as f32).clamp(0.0, SIDE as f32));
+    let plus = |a: [f32; 3], d: [i32; 3]| [0, 1, 2].map(|i| (a[i] + d[i] as f32).clamp(0.0, SIDE as f32));
     prop_oneof![
         6 => (vertex(), near(), near()).prop_map(move |(a, d, e)| [a, plus(a, d), plus(a, e)]),
         1 => prop::array::uniform3(vertex()),
@@ -135,7 +106,8 @@ enum End {
 }
 
 fn end() -> impl Strategy<Value = End> {
-    let coordinate = prop_oneof![4 => -10f64..60.0, 2 => (-3..50i32).prop_map(f64::from), 1 => Just(-0.0), 1 => -1e7f64..1e7];
+    let coordinate =
+        prop_oneof![4 => -10f64..60.0, 2 => (-3..50i32).prop_map(f64::from), 1 => Just(-0.0), 1 => -1e7f64..1e7];
     prop_oneof![
         1 => prop::array::uniform3(coordinate).prop_map(End::At),
         3 => (
@@ -154,11 +126,7 @@ fn segment() -> impl Strategy<Value = (End, End, Option<[f64; 3]>)> {
     let exponent = prop::sample::select(vec![0, 1, 4, 20, 40, 44]);
     let vector = (prop::array::uniform3(-9i32..=9), exponent)
         .prop_map(|(d, exponent)| d.map(|c| f64::from(c) * 2f64.powi(exponent)));
-    (
-        end(),
-        end(),
-        prop_oneof![2 => Just(None), 1 => vector.prop_map(Some)],
-    )
+    (end(), end(), prop_oneof![2 => Just(None), 1 => vector.prop_map(Some)])
 }
 
 fn resolve(end: &End, triangles: &[[Vec3; 3]]) -> DVec3 {

@@ -57,7 +57,10 @@ impl Acceleration {
         max_voxels: u64,
     ) -> Result<(Self, BuildReport), VoxelError> {
         if method == Method::None {
-            return Ok((Self::None(NoProofs), BuildReport { neighbourhoods: vec![None; emitters.len()], ..BuildReport::default() }));
+            return Ok((
+                Self::None(NoProofs),
+                BuildReport { neighbourhoods: vec![None; emitters.len()], ..BuildReport::default() },
+            ));
         }
         let grid = VoxelGrid::covering(bounds.0, bounds.1, voxel_size, max_voxels)?;
         let start = Instant::now();

@@ -108,8 +108,8 @@ impl From<AttributeValue> for openexr::AttributeValue {
 /// # Errors
 /// The file cannot be written, or an attribute's name is empty, repeated, longer than 31 bytes or not ASCII.
 pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue)]) -> Result<(), ImageError> {
-    let bytes = encode_exr(image, attributes)
-        .map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
+    let bytes =
+        encode_exr(image, attributes).map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
     write_bytes(path, &bytes)
 }
 
@@ -210,12 +210,7 @@ fn check_header(meta: &MetaData) -> Result<(), String> {
 fn check_shape(image: &Image) -> Result<(), String> {
     let area = image.width as usize * image.height as usize;
     if area == 0 || image.pixels.len() != area {
-        return Err(format!(
-            "the image is {} × {} pixels but holds {}",
-            image.width,
-            image.height,
-            image.pixels.len()
-        ));
+        return Err(format!("the image is {} × {} pixels but holds {}", image.width, image.height, image.pixels.len()));
     }
     Ok(())
 }
@@ -326,7 +321,8 @@ mod tests {
     #[test]
     fn exr_bytes_depend_on_the_arguments_alone() {
         let names: Vec<String> = (0..20).map(|i| format!("vdf:{i}")).collect();
-        let mut attributes: Vec<(&str, AttributeValue)> = names.iter().map(|name| (name.as_str(), 1.5.into())).collect();
+        let mut attributes: Vec<(&str, AttributeValue)> =
+            names.iter().map(|name| (name.as_str(), 1.5.into())).collect();
         attributes.push(("vdf:seed", AttributeValue::Integer(i64::MAX)));
         attributes.push(("vdf:scene", "größe.xml".into()));
         let first = encode_exr(&gradient(), &attributes).unwrap();
@@ -354,7 +350,8 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("half.exr");
         let half = exr::prelude::f16::from_f32;
-        exr::prelude::write_rgba_file(&path, 3, 2, |x, y| (half(x as f32), half(y as f32), half(0.5), half(1.0))).unwrap();
+        exr::prelude::write_rgba_file(&path, 3, 2, |x, y| (half(x as f32), half(y as f32), half(0.5), half(1.0)))
+            .unwrap();
         let image = read_exr(&path).unwrap();
         assert_eq!((image.width, image.height), (3, 2));
         assert_eq!(image.pixels[5], Rgb::new(2.0, 1.0, 0.5));

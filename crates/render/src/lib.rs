@@ -27,12 +27,12 @@ mod visibility;
 mod world;
 
 pub use acceleration::{Acceleration, BuildReport};
-pub use lights::{LightSample, Lights};
-pub use media::{Flight, Media};
 pub use atomic_file::{check_writable, write_atomically};
 pub use error::RenderError;
 pub use image::Image;
 pub use image_io::{AttributeValue, ImageError, read_exr, write_exr, write_png};
+pub use lights::{LightSample, Lights};
+pub use media::{Flight, Media};
 pub use mesh::Triangle;
 pub use method::{Method, UnknownMethod};
 pub use metrics::{Comparison, compare};

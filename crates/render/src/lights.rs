@@ -2,7 +2,11 @@
 
 use glam::DVec3;
 
-use crate::{Rgb, Triangle, frame::sample_uniform_sphere, scene::{Emitter, Scene}};
+use crate::{
+    Rgb, Triangle,
+    frame::sample_uniform_sphere,
+    scene::{Emitter, Scene},
+};
 
 /// The emitters of a scene, prepared for sampling.
 #[derive(Debug)]

@@ -77,7 +77,8 @@ impl Media {
         let triangles: Vec<_> = boundaries.iter().flat_map(|b| b.triangles.iter().copied()).collect();
         let bvh = Bvh::new(&triangles);
         let largest = bvh.bounds().map_or(0.0, |(min, max)| min.abs().max(max.abs()).max_element());
-        let faces = boundaries.iter().enumerate().flat_map(|(i, b)| b.triangles.iter().map(move |t| (i, t.area_normal())));
+        let faces =
+            boundaries.iter().enumerate().flat_map(|(i, b)| b.triangles.iter().map(move |t| (i, t.area_normal())));
         Self {
             media: media.to_vec(),
             sides: boundaries.iter().map(|b| [b.interior, b.exterior]).collect(),

@@ -20,7 +20,10 @@ pub struct Comparison {
 /// If they differ in size.
 pub fn compare(image: &Image, reference: &Image) -> Result<Comparison, RenderError> {
     if (image.width, image.height) != (reference.width, reference.height) {
-        return Err(RenderError::SizeMismatch { a: [image.width, image.height], b: [reference.width, reference.height] });
+        return Err(RenderError::SizeMismatch {
+            a: [image.width, image.height],
+            b: [reference.width, reference.height],
+        });
     }
     let channels = |image: &Image| -> Vec<f64> { image.pixels.iter().flat_map(Rgb::to_array).map(f64::from).collect() };
     let (a, b) = (channels(image), channels(reference));

@@ -172,7 +172,14 @@ impl Job<'_> {
     }
 
     #[inline]
-    fn sample<P: Proofs>(&self, integrator: &Integrator<'_, P>, x: u32, y: u32, sample: u32, counters: &mut Counters) -> Rgb {
+    fn sample<P: Proofs>(
+        &self,
+        integrator: &Integrator<'_, P>,
+        x: u32,
+        y: u32,
+        sample: u32,
+        counters: &mut Counters,
+    ) -> Rgb {
         let mut sampler = Sampler::new(self.seed, x, y, sample);
         let film = &self.scene.film;
         let [dx, dy] = film.filter.sample(&mut sampler);

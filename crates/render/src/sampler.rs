@@ -57,7 +57,9 @@ mod tests {
         let take = |mut s: Sampler| [s.next_1d(), s.next_1d(), s.next_1d()];
         let reference = take(Sampler::new(1, 2, 3, 4));
         assert_eq!(reference, take(Sampler::new(1, 2, 3, 4)));
-        for other in [Sampler::new(0, 2, 3, 4), Sampler::new(1, 3, 2, 4), Sampler::new(1, 2, 3, 5), Sampler::new(1, 2, 4, 3)] {
+        for other in
+            [Sampler::new(0, 2, 3, 4), Sampler::new(1, 3, 2, 4), Sampler::new(1, 2, 3, 5), Sampler::new(1, 2, 4, 3)]
+        {
             assert_ne!(reference, take(other));
         }
     }

@@ -141,7 +141,12 @@ impl Statistics {
                 .build
                 .neighbourhoods
                 .iter()
-                .map(|n| n.map(|voxels| NeighbourhoodSize { voxels, share_of_free: ratio(voxels as u64, free as u64).unwrap_or(0.0) }))
+                .map(|n| {
+                    n.map(|voxels| NeighbourhoodSize {
+                        voxels,
+                        share_of_free: ratio(voxels as u64, free as u64).unwrap_or(0.0),
+                    })
+                })
                 .collect(),
             refused: r.counters.refused,
         }
@@ -179,7 +184,12 @@ impl fmt::Display for Statistics {
         }
         for (i, n) in self.neighbourhoods.iter().enumerate() {
             if let Some(n) = n {
-                writeln!(f, "emitter {i}      neighbourhood of {} voxels, {} of the free ones", n.voxels, percent(Some(n.share_of_free)))?;
+                writeln!(
+                    f,
+                    "emitter {i}      neighbourhood of {} voxels, {} of the free ones",
+                    n.voxels,
+                    percent(Some(n.share_of_free))
+                )?;
             }
         }
         writeln!(

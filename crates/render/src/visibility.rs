@@ -72,7 +72,11 @@ impl<F: SafeZones> Proofs for NeighbourhoodProofs<F> {
     fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
         match (&self.neighbourhoods[emitter], self.base.grid.voxel_containing(from)) {
             (Some(neighbourhood), Some(voxel)) => {
-                if neighbourhood.proves(voxel) { Answer::Unoccluded } else { Answer::Unknown }
+                if neighbourhood.proves(voxel) {
+                    Answer::Unoccluded
+                } else {
+                    Answer::Unknown
+                }
             }
             _ => self.base.answer(emitter, from, to),
         }

@@ -113,7 +113,10 @@ const LIFT: f64 = 1.0 / 4_294_967_296.0;
 /// The box around occluders, medium boundaries and point emitters; around the camera if there are none.
 fn bounds(scene: &Scene, triangles: &[Triangle]) -> (DVec3, DVec3) {
     let boundaries = scene.boundaries.iter().flat_map(|b| &b.triangles);
-    let lights = scene.emitters.iter().filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
+    let lights = scene
+        .emitters
+        .iter()
+        .filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
     let points = triangles.iter().chain(boundaries).flat_map(Triangle::vertices_f64).chain(lights);
     let (min, max) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
     if min.x <= max.x {

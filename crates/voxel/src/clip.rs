@@ -55,11 +55,7 @@ impl VoxelGrid {
 
     fn span_in_order(&self, a: DVec3, b: DVec3) -> Span {
         let resolution = self.resolution();
-        let box_max = DVec3::new(
-            resolution.x.into(),
-            resolution.y.into(),
-            resolution.z.into(),
-        );
+        let box_max = DVec3::new(resolution.x.into(), resolution.y.into(), resolution.z.into());
         let (ga, gb) = (self.grid_coordinates(a), self.grid_coordinates(b));
         let reach = ga.abs().max(gb.abs()).max(box_max).max_element();
         // `max` drops NaN, so both ends are asked as well.
@@ -89,11 +85,7 @@ impl VoxelGrid {
         let (pa, pb) = (ga + d * enter, ga + d * leave);
         let (mut from, mut to) = (pa, pb);
         for axis in 0..3 {
-            let outwards = if pa[axis] <= pb[axis] {
-                margin
-            } else {
-                -margin
-            };
+            let outwards = if pa[axis] <= pb[axis] { margin } else { -margin };
             from[axis] -= outwards;
             to[axis] += outwards;
         }

@@ -50,11 +50,7 @@ impl Resolution {
         const fn positive(n: u32) -> u32 {
             if n == 0 { 1 } else { n }
         }
-        Self {
-            x: positive(x),
-            y: positive(y),
-            z: positive(z),
-        }
+        Self { x: positive(x), y: positive(y), z: positive(z) }
     }
 
     /// The number of voxels.
@@ -86,9 +82,7 @@ impl Resolution {
 
     /// All voxels in the order of their linear coordinates.
     pub fn voxels(self) -> impl Iterator<Item = Voxel> {
-        (0..self.z).flat_map(move |k| {
-            (0..self.y).flat_map(move |j| (0..self.x).map(move |i| Voxel::new(i, j, k)))
-        })
+        (0..self.z).flat_map(move |k| (0..self.y).flat_map(move |j| (0..self.x).map(move |i| Voxel::new(i, j, k))))
     }
 }
 
@@ -113,12 +107,7 @@ impl VoxelGrid {
     /// If the bounds are not finite or are empty, the size is not a positive number, the grid has more than
     /// `max_voxels` voxels, or the voxels are smaller than four single-precision steps at the scene's largest
     /// coordinate. The last two name a size that works and is the smallest but for rounding to three digits.
-    pub fn covering(
-        min: DVec3,
-        max: DVec3,
-        voxel_size: f64,
-        max_voxels: u64,
-    ) -> Result<Self, VoxelError> {
+    pub fn covering(min: DVec3, max: DVec3, voxel_size: f64, max_voxels: u64) -> Result<Self, VoxelError> {
         let largest = min.abs().max_element().max(max.abs().max_element());
         if !(min.is_finite() && max.is_finite() && largest <= f64::from(f32::MAX)) {
             return Err(VoxelError::NonFiniteBounds);
@@ -134,19 +123,11 @@ impl VoxelGrid {
         let finest = finest_size(largest);
         let smallest = || smallest_usable(extent, finest, budget);
         if voxel_size < finest {
-            return Err(VoxelError::TooFine {
-                size: voxel_size,
-                smallest: smallest(),
-            });
+            return Err(VoxelError::TooFine { size: voxel_size, smallest: smallest() });
         }
         let voxels = count(extent, voxel_size);
         if voxels > budget as f64 {
-            return Err(VoxelError::TooManyVoxels {
-                size: voxel_size,
-                voxels,
-                budget,
-                smallest: smallest(),
-            });
+            return Err(VoxelError::TooManyVoxels { size: voxel_size, voxels, budget, smallest: smallest() });
         }
 
         let counts = counts(extent, voxel_size);
@@ -244,11 +225,7 @@ impl VoxelGrid {
     #[inline]
     pub(crate) fn truncated(&self, t: DVec3) -> Voxel {
         let last = self.resolution.last();
-        Voxel::new(
-            (t.x as u32).min(last.i),
-            (t.y as u32).min(last.j),
-            (t.z as u32).min(last.k),
-        )
+        Voxel::new((t.x as u32).min(last.i), (t.y as u32).min(last.j), (t.z as u32).min(last.k))
     }
 
     /// The dilation for triangles whose grid coordinates may exceed those that the grid was laid out for.
@@ -299,11 +276,7 @@ fn smallest_usable(extent: DVec3, finest: f64, budget: u64) -> f64 {
     let digit = 10f64.powf(size.log10().floor() - 2.0);
     // Half a digit of slack may be lost to rounding; an unrounded size that works beats a round one that does not.
     let rounded = (size / digit).ceil() * digit;
-    if rounded >= finest && fits(rounded) {
-        rounded
-    } else {
-        size
-    }
+    if rounded >= finest && fits(rounded) { rounded } else { size }
 }
 
 #[cfg(test)]

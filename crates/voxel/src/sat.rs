@@ -37,19 +37,11 @@ impl Projection {
             let a = [p[1] - q[1], q[0] - p[0]];
             let norm = a[0].abs() + a[1].abs();
             if norm < SHORTEST_AXIS {
-                return PlanarAxis {
-                    a: [0.0; 2],
-                    low: 0.0,
-                    high: 0.0,
-                };
+                return PlanarAxis { a: [0.0; 2], low: 0.0, high: 0.0 };
             }
             let dots = points.map(|p| a[0] * p[0] + a[1] * p[1]);
             let (low, high) = range(dots);
-            PlanarAxis {
-                a,
-                low: low - radius * norm,
-                high: high + radius * norm,
-            }
+            PlanarAxis { a, low: low - radius * norm, high: high + radius * norm }
         });
         Self { axes }
     }
@@ -83,19 +75,9 @@ impl Slab {
         let n = (b - a).cross(c - a);
         let norm = n.abs().element_sum();
         let usable = norm >= SHORTEST_AXIS;
-        let size = if usable {
-            n.abs()
-        } else {
-            a.max(b).max(c) - a.min(b).min(c)
-        };
+        let size = if usable { n.abs() } else { a.max(b).max(c) - a.min(b).min(c) };
         let (low, high) = range(vertices.map(|p| n.dot(p)));
-        Self {
-            n,
-            low: low - radius * norm,
-            high: high + radius * norm,
-            axis: size.max_position(),
-            usable,
-        }
+        Self { n, low: low - radius * norm, high: high + radius * norm, axis: size.max_position(), usable }
     }
 
     /// The interval of centre coordinates along `self.axis` that the normal does not separate, for a column centred at
@@ -110,10 +92,7 @@ impl Slab {
         }
         let [nu, nv] = [self.n[(self.axis + 1) % 3], self.n[(self.axis + 2) % 3]];
         let dot = nu * u + nv * v;
-        let (d0, d1) = (
-            (self.low - dot) / self.n[self.axis],
-            (self.high - dot) / self.n[self.axis],
-        );
+        let (d0, d1) = ((self.low - dot) / self.n[self.axis], (self.high - dot) / self.n[self.axis]);
         (d0.min(d1), d0.max(d1))
     }
 }

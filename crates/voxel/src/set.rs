@@ -21,11 +21,7 @@ impl VoxelSet {
     pub fn new(resolution: Resolution) -> Self {
         let words_per_row = words_per_row(resolution);
         let words = vec![0; words_per_row * resolution.y as usize * resolution.z as usize];
-        Self {
-            resolution,
-            words_per_row,
-            words,
-        }
+        Self { resolution, words_per_row, words }
     }
 
     /// The set whose rows `fill` writes, in parallel over slices: `fill(j, k, row)` gets the zeroed words of the row
@@ -35,32 +31,22 @@ impl VoxelSet {
         let mut set = Self::new(resolution);
         let per_row = set.words_per_row;
         let mask = padding_mask(resolution);
-        set.words
-            .par_chunks_mut(per_row * resolution.y as usize)
-            .zip(0..resolution.z)
-            .for_each(|(slice, k)| {
-                for (row, j) in slice.chunks_exact_mut(per_row).zip(0..resolution.y) {
-                    fill(j, k, row);
-                    if let Some(last) = row.last_mut() {
-                        *last &= mask;
-                    }
+        set.words.par_chunks_mut(per_row * resolution.y as usize).zip(0..resolution.z).for_each(|(slice, k)| {
+            for (row, j) in slice.chunks_exact_mut(per_row).zip(0..resolution.y) {
+                fill(j, k, row);
+                if let Some(last) = row.last_mut() {
+                    *last &= mask;
                 }
-            });
+            }
+        });
         set
     }
 
     /// A set from all its words, row after row; the caller has kept the padding clear.
     pub(crate) fn from_words(resolution: Resolution, words: Vec<u64>) -> Self {
         let words_per_row = words_per_row(resolution);
-        debug_assert_eq!(
-            words.len(),
-            words_per_row * resolution.y as usize * resolution.z as usize
-        );
-        Self {
-            resolution,
-            words_per_row,
-            words,
-        }
+        debug_assert_eq!(words.len(), words_per_row * resolution.y as usize * resolution.z as usize);
+        Self { resolution, words_per_row, words }
     }
 
     /// The resolution of the grid whose voxels these are.
@@ -102,9 +88,7 @@ impl VoxelSet {
     #[inline]
     pub fn row(&self, j: u32, k: u32) -> &[u64] {
         let start = (j as usize + self.resolution.y as usize * k as usize) * self.words_per_row;
-        self.words
-            .get(start..start + self.words_per_row)
-            .unwrap_or_default()
+        self.words.get(start..start + self.words_per_row).unwrap_or_default()
     }
 
     /// The number of words of a row: ceil(X / 64).
@@ -115,18 +99,13 @@ impl VoxelSet {
 
     /// The voxels of the set in the order of their linear coordinates.
     pub fn iter(&self) -> impl Iterator<Item = Voxel> {
-        let rows =
-            (0..self.resolution.z).flat_map(move |k| (0..self.resolution.y).map(move |j| (j, k)));
+        let rows = (0..self.resolution.z).flat_map(move |k| (0..self.resolution.y).map(move |j| (j, k)));
         rows.flat_map(move |(j, k)| {
-            self.row(j, k)
-                .iter()
-                .zip(0u32..)
-                .flat_map(move |(&word, w)| {
-                    let clear_lowest =
-                        |&rest: &u64| Some(rest & (rest - 1)).filter(|&rest| rest != 0);
-                    std::iter::successors(Some(word).filter(|&word| word != 0), clear_lowest)
-                        .map(move |rest| Voxel::new(64 * w + rest.trailing_zeros(), j, k))
-                })
+            self.row(j, k).iter().zip(0u32..).flat_map(move |(&word, w)| {
+                let clear_lowest = |&rest: &u64| Some(rest & (rest - 1)).filter(|&rest| rest != 0);
+                std::iter::successors(Some(word).filter(|&word| word != 0), clear_lowest)
+                    .map(move |rest| Voxel::new(64 * w + rest.trailing_zeros(), j, k))
+            })
         })
     }
 
@@ -151,11 +130,7 @@ pub(crate) fn words_per_row(resolution: Resolution) -> usize {
 
 /// Index of the word and number of the bit of a voxel.
 #[inline]
-pub(crate) fn bit_address(
-    resolution: Resolution,
-    words_per_row: usize,
-    voxel: Voxel,
-) -> (usize, u32) {
+pub(crate) fn bit_address(resolution: Resolution, words_per_row: usize, voxel: Voxel) -> (usize, u32) {
     let row = voxel.j as usize + resolution.y as usize * voxel.k as usize;
     (row * words_per_row + (voxel.i / 64) as usize, voxel.i % 64)
 }

@@ -38,17 +38,11 @@ where
     T: IntoParallelIterator<Item = [Vec3; 3]>,
 {
     let bits = AtomicBits::new(grid.resolution());
-    triangles
-        .into_par_iter()
-        .try_for_each(|triangle| add_triangle(grid, &bits, triangle))?;
+    triangles.into_par_iter().try_for_each(|triangle| add_triangle(grid, &bits, triangle))?;
     Ok(bits.into_set())
 }
 
-fn add_triangle(
-    grid: &VoxelGrid,
-    bits: &AtomicBits,
-    triangle: [Vec3; 3],
-) -> Result<(), VoxelError> {
+fn add_triangle(grid: &VoxelGrid, bits: &AtomicBits, triangle: [Vec3; 3]) -> Result<(), VoxelError> {
     if !triangle.iter().all(|v| v.is_finite()) {
         return Err(VoxelError::NonFiniteTriangle);
     }
@@ -82,12 +76,7 @@ fn touched(low: f64, high: f64, limit: u32) -> Option<RangeInclusive<u32>> {
 }
 
 /// Tests the voxels of a box around the triangle, column by column.
-fn scan(
-    bits: &AtomicBits,
-    vertices: &[DVec3; 3],
-    bounds: &[RangeInclusive<u32>; 3],
-    dilation: f64,
-) {
+fn scan(bits: &AtomicBits, vertices: &[DVec3; 3], bounds: &[RangeInclusive<u32>; 3], dilation: f64) {
     let radius = 0.5 + dilation;
     let slab = Slab::new(vertices, radius);
     let w = slab.axis;
@@ -105,12 +94,8 @@ fn scan(
             }
             let (near, far) = slab.depths(x, y);
             // From centres to indices; 4δ covers the rounding of the depths.
-            let first = (near - 0.5 - 4.0 * dilation)
-                .ceil()
-                .max(f64::from(*bounds[w].start()));
-            let last = (far - 0.5 + 4.0 * dilation)
-                .floor()
-                .min(f64::from(*bounds[w].end()));
+            let first = (near - 0.5 - 4.0 * dilation).ceil().max(f64::from(*bounds[w].start()));
+            let last = (far - 0.5 + 4.0 * dilation).floor().min(f64::from(*bounds[w].end()));
             if first > last {
                 continue;
             }
@@ -137,13 +122,7 @@ impl AtomicBits {
     fn new(resolution: Resolution) -> Self {
         let words_per_row = words_per_row(resolution);
         let count = words_per_row * resolution.y as usize * resolution.z as usize;
-        Self {
-            resolution,
-            words_per_row,
-            words: std::iter::repeat_with(AtomicU64::default)
-                .take(count)
-                .collect(),
-        }
+        Self { resolution, words_per_row, words: std::iter::repeat_with(AtomicU64::default).take(count).collect() }
     }
 
     #[inline]
@@ -157,10 +136,7 @@ impl AtomicBits {
     }
 
     fn into_set(self) -> VoxelSet {
-        VoxelSet::from_words(
-            self.resolution,
-            self.words.into_iter().map(AtomicU64::into_inner).collect(),
-        )
+        VoxelSet::from_words(self.resolution, self.words.into_iter().map(AtomicU64::into_inner).collect())
     }
 }
 

@@ -44,7 +44,11 @@ pub struct Bvh {
 
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Bvh").field("triangles", &self.triangles.len()).field("min", &self.min).field("max", &self.max).finish()
+        f.debug_struct("Bvh")
+            .field("triangles", &self.triangles.len())
+            .field("min", &self.min)
+            .field("max", &self.max)
+            .finish()
     }
 }
 

@@ -193,8 +193,5 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
         return None;
     }
     let sum = weight_a + weight_b + weight_c;
-    Some(TriangleHit {
-        t: side_p / (side_p - side_q),
-        barycentric: [weight_a / sum, weight_b / sum, weight_c / sum],
-    })
+    Some(TriangleHit { t: side_p / (side_p - side_q), barycentric: [weight_a / sum, weight_b / sum, weight_c / sum] })
 }

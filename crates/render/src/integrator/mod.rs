@@ -1,7 +1,7 @@
 //! The integrators, and what they share: next-event estimation and multiple importance sampling.
 
-mod volpath;
 mod raymarch;
+mod volpath;
 
 use glam::DVec3;
 
@@ -57,7 +57,14 @@ impl<P: Proofs> Integrator<'_, P> {
 
     /// Next-event estimation where direction sampling may find the same light: weighted by the power heuristic.
     #[inline]
-    fn direct_light(&self, point: DVec3, vertex: &Vertex, medium: Option<MediumId>, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+    fn direct_light(
+        &self,
+        point: DVec3,
+        vertex: &Vertex,
+        medium: Option<MediumId>,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
         self.emitter_sample(point, vertex, medium, sampler, counters).map_or(Rgb::ZERO, |(value, light_pdf, pdf)| {
             // A point emitter is found by no scattered ray.
             if light_pdf > 0.0 { value * to_f32(power_heuristic(light_pdf, pdf)) } else { value }
@@ -66,7 +73,14 @@ impl<P: Proofs> Integrator<'_, P> {
 
     /// Next-event estimation where it is the only way to find light.
     #[inline]
-    fn direct_light_alone(&self, point: DVec3, vertex: &Vertex, medium: MediumId, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+    fn direct_light_alone(
+        &self,
+        point: DVec3,
+        vertex: &Vertex,
+        medium: MediumId,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
         self.emitter_sample(point, vertex, Some(medium), sampler, counters).map_or(Rgb::ZERO, |(value, _, _)| value)
     }
 

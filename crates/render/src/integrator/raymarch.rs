@@ -9,7 +9,11 @@
 
 use super::{Integrator, Origin, PathRay, Vertex, survives, to_f32};
 use crate::{
-    Rgb, Sampler, frame::sample_cosine_hemisphere, media::Flight, geometry::Segment, visibility::{Counters, Proofs},
+    Rgb, Sampler,
+    frame::sample_cosine_hemisphere,
+    geometry::Segment,
+    media::Flight,
+    visibility::{Counters, Proofs},
 };
 
 impl<P: Proofs> Integrator<'_, P> {
@@ -60,7 +64,15 @@ impl<P: Proofs> Integrator<'_, P> {
 
     /// Emitted light scattered once into the ray along `free`, whose optical depth is `tau`.
     #[inline]
-    fn in_scattered(&self, free: &Segment, ray: &PathRay, tau: f64, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+    fn in_scattered(
+        &self,
+        free: &Segment,
+        ray: &PathRay,
+        tau: f64,
+        samples: u32,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
         let width = -(-tau).exp_m1() / f64::from(samples);
         let mut sum = Rgb::ZERO;
         for k in 0..samples {

@@ -6,7 +6,11 @@
 
 use super::{Integrator, Origin, PathRay, Vertex, survives};
 use crate::{
-    Rgb, Sampler, frame::sample_cosine_hemisphere, media::Flight, geometry::Segment, visibility::{Counters, Proofs},
+    Rgb, Sampler,
+    frame::sample_cosine_hemisphere,
+    geometry::Segment,
+    media::Flight,
+    visibility::{Counters, Proofs},
 };
 
 impl<P: Proofs> Integrator<'_, P> {

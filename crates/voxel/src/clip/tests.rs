@@ -4,8 +4,7 @@ use super::*;
 use crate::Resolution;
 
 fn grid() -> VoxelGrid {
-    VoxelGrid::covering(DVec3::ZERO, DVec3::new(30.0, 21.0, 12.0), 3.0, 1 << 20)
-        .expect("a legal grid")
+    VoxelGrid::covering(DVec3::ZERO, DVec3::new(30.0, 21.0, 12.0), 3.0, 1 << 20).expect("a legal grid")
 }
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
@@ -24,10 +23,7 @@ fn ends_outside_move_to_the_border() {
     // The ends are rounded outwards, and at x = 0 there is no more outside.
     assert_eq!(span, Span::Inside(Voxel::new(0, 3, 1), Voxel::new(4, 3, 1)));
     let through = grid().voxel_span(v(10.0, -50.0, 4.0), v(10.0, 50.0, 4.0));
-    assert_eq!(
-        through,
-        Span::Inside(Voxel::new(3, 0, 1), Voxel::new(3, 6, 1))
-    );
+    assert_eq!(through, Span::Inside(Voxel::new(3, 0, 1), Voxel::new(3, 6, 1)));
 }
 
 #[test]
@@ -91,12 +87,7 @@ fn within(side: i64) -> impl Strategy<Value = i64> {
 
 /// Up to 2⁵¹, where steps of the last place are a sizeable part of a voxel, so that careless clipping shows.
 fn distance() -> impl Strategy<Value = i64> {
-    prop_oneof![
-        -20i64..20,
-        Just(0),
-        -1_000_000_000_000i64..1_000_000_000_000,
-        -(1i64 << 51)..1 << 51
-    ]
+    prop_oneof![-20i64..20, Just(0), -1_000_000_000_000i64..1_000_000_000_000, -(1i64 << 51)..1 << 51]
 }
 
 proptest! {

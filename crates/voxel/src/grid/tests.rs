@@ -5,10 +5,7 @@ use super::*;
 const BUDGET: u64 = 1 << 30;
 
 fn cornell(size: f64) -> VoxelGrid {
-    let (min, max) = (
-        DVec3::new(-26.0, -16.0, -790.0),
-        DVec3::new(584.0, 566.0, 560.0),
-    );
+    let (min, max) = (DVec3::new(-26.0, -16.0, -790.0), DVec3::new(584.0, 566.0, 560.0));
     VoxelGrid::covering(min, max, size, BUDGET).expect("a legal grid")
 }
 
@@ -22,105 +19,56 @@ fn resolutions_of_the_thesis() {
 #[test]
 fn linear_index_is_i_plus_j_x_plus_k_x_y() {
     let grid = cornell(8.0);
-    assert_eq!(
-        grid.linear_index(Voxel::new(3, 5, 7)),
-        3 + 5 * 77 + 7 * 77 * 73
-    );
-    let indices: Vec<_> = Resolution::new(3, 2, 4)
-        .voxels()
-        .map(|v| Resolution::new(3, 2, 4).linear_index(v))
-        .collect();
+    assert_eq!(grid.linear_index(Voxel::new(3, 5, 7)), 3 + 5 * 77 + 7 * 77 * 73);
+    let indices: Vec<_> = Resolution::new(3, 2, 4).voxels().map(|v| Resolution::new(3, 2, 4).linear_index(v)).collect();
     assert_eq!(indices, (0..24).collect::<Vec<_>>());
 }
 
 #[test]
 fn faces_belong_to_the_voxel_above_and_the_last_face_to_the_last_voxel() {
-    let grid =
-        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(24.0), 8.0, BUDGET).expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(24.0), 8.0, BUDGET).expect("a legal grid");
     let at = |x| grid.voxel_containing(DVec3::new(x, 1.0, 1.0)).map(|v| v.i);
-    assert_eq!(
-        [0.0, -0.0, 8.0, 8f64.next_down(), 24.0].map(at),
-        [Some(0), Some(0), Some(1), Some(0), Some(2)]
-    );
-    for outside in [
-        -1e-9,
-        24.001,
-        f64::NAN,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        1e300,
-    ] {
+    assert_eq!([0.0, -0.0, 8.0, 8f64.next_down(), 24.0].map(at), [Some(0), Some(0), Some(1), Some(0), Some(2)]);
+    for outside in [-1e-9, 24.001, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
         assert_eq!(at(outside), None, "{outside}");
     }
 }
 
 #[test]
 fn negative_zero_as_origin() {
-    let grid =
-        VoxelGrid::covering(DVec3::splat(-0.0), DVec3::ONE, 0.5, BUDGET).expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::splat(-0.0), DVec3::ONE, 0.5, BUDGET).expect("a legal grid");
     assert!(grid.origin().x.is_sign_positive());
-    assert_eq!(
-        grid.voxel_containing(DVec3::splat(-0.0)),
-        Some(Voxel::new(0, 0, 0))
-    );
+    assert_eq!(grid.voxel_containing(DVec3::splat(-0.0)), Some(Voxel::new(0, 0, 0)));
 }
 
 #[test]
 fn flat_scenes_get_one_layer() {
-    let grid = VoxelGrid::covering(
-        DVec3::new(0.0, 3.0, 0.0),
-        DVec3::new(4.0, 3.0, 0.0),
-        1.0,
-        BUDGET,
-    );
+    let grid = VoxelGrid::covering(DVec3::new(0.0, 3.0, 0.0), DVec3::new(4.0, 3.0, 0.0), 1.0, BUDGET);
     let grid = grid.expect("a legal grid");
     assert_eq!(grid.resolution(), Resolution::new(4, 1, 1));
-    assert_eq!(
-        grid.voxel_containing(DVec3::new(4.0, 3.0, 0.0)),
-        Some(Voxel::new(3, 0, 0))
-    );
-    assert!(
-        VoxelGrid::covering(DVec3::ZERO, DVec3::ZERO, 1.0, BUDGET).is_ok(),
-        "a scene that is one point"
-    );
+    assert_eq!(grid.voxel_containing(DVec3::new(4.0, 3.0, 0.0)), Some(Voxel::new(3, 0, 0)));
+    assert!(VoxelGrid::covering(DVec3::ZERO, DVec3::ZERO, 1.0, BUDGET).is_ok(), "a scene that is one point");
 }
 
 #[test]
 fn bad_bounds_and_sizes_are_errors() {
-    let covering = |min: f64, max: f64, size| {
-        VoxelGrid::covering(DVec3::splat(min), DVec3::splat(max), size, BUDGET)
-    };
+    let covering = |min: f64, max: f64, size| VoxelGrid::covering(DVec3::splat(min), DVec3::splat(max), size, BUDGET);
     for bound in [f64::NAN, f64::INFINITY, 1e39] {
         assert_eq!(covering(0.0, bound, 1.0), Err(VoxelError::NonFiniteBounds));
     }
-    assert_eq!(
-        covering(f64::NAN, 1.0, 1.0),
-        Err(VoxelError::NonFiniteBounds)
-    );
-    assert_eq!(
-        covering(f64::INFINITY, f64::NEG_INFINITY, 1.0),
-        Err(VoxelError::NonFiniteBounds)
-    );
+    assert_eq!(covering(f64::NAN, 1.0, 1.0), Err(VoxelError::NonFiniteBounds));
+    assert_eq!(covering(f64::INFINITY, f64::NEG_INFINITY, 1.0), Err(VoxelError::NonFiniteBounds));
     assert_eq!(covering(1.0, 0.0, 1.0), Err(VoxelError::EmptyBounds));
     for size in [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
-        assert!(
-            matches!(
-                covering(0.0, 1.0, size),
-                Err(VoxelError::InvalidVoxelSize { .. })
-            ),
-            "{size}"
-        );
+        assert!(matches!(covering(0.0, 1.0, size), Err(VoxelError::InvalidVoxelSize { .. })), "{size}");
     }
 }
 
 #[test]
 fn voxels_below_single_precision_are_an_error_that_names_what_works() {
-    let covering =
-        |size| VoxelGrid::covering(DVec3::splat(1e6), DVec3::splat(1e6 + 1.0), size, BUDGET);
+    let covering = |size| VoxelGrid::covering(DVec3::splat(1e6), DVec3::splat(1e6 + 1.0), size, BUDGET);
     // The step at 10⁶ is 1/16.
-    let Err(VoxelError::TooFine { smallest, .. }) = covering(1e-3) else {
-        panic!("must be too fine")
-    };
+    let Err(VoxelError::TooFine { smallest, .. }) = covering(1e-3) else { panic!("must be too fine") };
     assert_eq!(smallest, 0.25);
     assert!(covering(smallest).is_ok());
     assert!(covering(f64::MIN_POSITIVE).is_err());

@@ -2,15 +2,7 @@ use super::*;
 
 #[test]
 fn rows_are_padded_to_words() {
-    for (x, words) in [
-        (1, 1),
-        (2, 1),
-        (63, 1),
-        (64, 1),
-        (65, 2),
-        (128, 2),
-        (129, 3),
-    ] {
+    for (x, words) in [(1, 1), (2, 1), (63, 1), (64, 1), (65, 2), (128, 2), (129, 3)] {
         let set = VoxelSet::new(Resolution::new(x, 3, 2));
         assert_eq!((set.words_per_row(), set.bytes()), (words, 8 * words * 6));
     }
@@ -20,32 +12,20 @@ fn rows_are_padded_to_words() {
 fn insert_contains_count_iter() {
     for x in [1, 63, 64, 65, 130] {
         let resolution = Resolution::new(x, 2, 3);
-        let chosen: Vec<_> = resolution
-            .voxels()
-            .filter(|v| (v.i * 7 + v.j * 3 + v.k) % 5 < 2)
-            .collect();
+        let chosen: Vec<_> = resolution.voxels().filter(|v| (v.i * 7 + v.j * 3 + v.k) % 5 < 2).collect();
         let mut set = VoxelSet::new(resolution);
         assert!(set.is_empty());
         set.extend(chosen.iter().copied());
         assert_eq!(set.count(), chosen.len());
         assert_eq!(set.iter().collect::<Vec<_>>(), chosen);
-        assert!(
-            resolution
-                .voxels()
-                .all(|v| set.contains(v) == chosen.contains(&v))
-        );
+        assert!(resolution.voxels().all(|v| set.contains(v) == chosen.contains(&v)));
     }
 }
 
 #[test]
 fn voxels_beyond_the_grid_are_never_in_the_set() {
     let mut set = VoxelSet::from_rows(Resolution::new(65, 2, 2), |_, _, row| row.fill(u64::MAX));
-    for v in [
-        Voxel::new(65, 0, 0),
-        Voxel::new(127, 1, 1),
-        Voxel::new(0, 2, 0),
-        Voxel::new(0, 0, 2),
-    ] {
+    for v in [Voxel::new(65, 0, 0), Voxel::new(127, 1, 1), Voxel::new(0, 2, 0), Voxel::new(0, 0, 2)] {
         assert!(!set.contains(v));
         set.insert(v);
     }

@@ -12,22 +12,13 @@ fn touches_exactly(vertices: &[[i128; 3]; 3], voxel: Voxel, dilation: i128) -> b
     let radius = UNIT / 2 + dilation;
     let p = vertices.map(|v| [0, 1, 2].map(|axis| v[axis] - centre[axis]));
     let minus = |a: [i128; 3], b: [i128; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let cross = |a: [i128; 3], b: [i128; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
+    let cross =
+        |a: [i128; 3], b: [i128; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let edges = [minus(p[1], p[0]), minus(p[2], p[1]), minus(p[0], p[2])];
     let units = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     let mut axes = units.to_vec();
     axes.push(cross(edges[0], edges[1]));
-    axes.extend(
-        units
-            .iter()
-            .flat_map(|&unit| edges.map(|edge| cross(unit, edge))),
-    );
+    axes.extend(units.iter().flat_map(|&unit| edges.map(|edge| cross(unit, edge))));
     axes.iter().all(|axis| {
         let reach = radius * axis.iter().map(|c| c.abs()).sum::<i128>();
         let dots = p.map(|v| axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2]);
@@ -38,21 +29,13 @@ fn touches_exactly(vertices: &[[i128; 3]; 3], voxel: Voxel, dilation: i128) -> b
 /// A grid of voxels of size 1 whose origin is `offset`, and the set of triangles given in 1/16 voxel.
 fn voxelize_snapped(resolution: [i32; 3], offset: f64, triangles: &[[[i32; 3]; 3]]) -> VoxelSet {
     let extent = DVec3::from_array(resolution.map(f64::from));
-    let grid = VoxelGrid::covering(DVec3::splat(offset), extent + offset, 1.0, 1 << 28)
-        .expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::splat(offset), extent + offset, 1.0, 1 << 28).expect("a legal grid");
     let world = |c: i32| {
         let exact = f64::from(c) / 16.0 + offset;
-        assert_eq!(
-            f64::from(exact as f32),
-            exact,
-            "the test wants exact vertices"
-        );
+        assert_eq!(f64::from(exact as f32), exact, "the test wants exact vertices");
         exact as f32
     };
-    let triangles: Vec<_> = triangles
-        .iter()
-        .map(|t| t.map(|v| Vec3::from_array(v.map(world))))
-        .collect();
+    let triangles: Vec<_> = triangles.iter().map(|t| t.map(|v| Vec3::from_array(v.map(world)))).collect();
     voxelize(&grid, triangles).expect("finite vertices")
 }
 
@@ -61,14 +44,8 @@ fn check(resolution: [i32; 3], offset: f64, triangle: [[i32; 3]; 3]) -> Result<(
     let exact = triangle.map(|v| v.map(|c| i128::from(c) * (UNIT / 16)));
     for voxel in set.resolution().voxels() {
         let found = set.contains(voxel);
-        prop_assert!(
-            found || !touches_exactly(&exact, voxel, 0),
-            "{voxel:?} is missing for {triangle:?}"
-        );
-        prop_assert!(
-            !found || touches_exactly(&exact, voxel, 2),
-            "{voxel:?} is too much for {triangle:?}"
-        );
+        prop_assert!(found || !touches_exactly(&exact, voxel, 0), "{voxel:?} is missing for {triangle:?}");
+        prop_assert!(!found || touches_exactly(&exact, voxel, 2), "{voxel:?} is too much for {triangle:?}");
     }
     Ok(())
 }
@@ -161,22 +138,15 @@ fn triangle_in_a_face_marks_both_sides() {
         }
         let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
         let normal = (axis + 2) % 3;
-        let layers: std::collections::BTreeSet<_> =
-            set.iter().map(|v| [v.i, v.j, v.k][normal]).collect();
+        let layers: std::collections::BTreeSet<_> = set.iter().map(|v| [v.i, v.j, v.k][normal]).collect();
         assert_eq!(layers.into_iter().collect::<Vec<_>>(), [2, 3]);
     }
 }
 
 #[test]
 fn point_on_a_corner_marks_eight_voxels() {
-    assert_eq!(
-        voxelize_snapped([8, 8, 8], 0.0, &[[[32, 48, 64]; 3]]).count(),
-        8
-    );
-    assert_eq!(
-        voxelize_snapped([8, 8, 8], 0.0, &[[[0, 0, 0]; 3]]).count(),
-        1
-    );
+    assert_eq!(voxelize_snapped([8, 8, 8], 0.0, &[[[32, 48, 64]; 3]]).count(), 8);
+    assert_eq!(voxelize_snapped([8, 8, 8], 0.0, &[[[0, 0, 0]; 3]]).count(), 1);
 }
 
 #[test]
@@ -185,15 +155,9 @@ fn triangles_on_the_greatest_face_mark_the_last_layer() {
     let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
     assert!(!set.is_empty() && set.iter().all(|v| v.k == 7));
     // A bound that is no whole number of voxels, met exactly.
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(0.3f32.into()), 0.1, 1 << 20)
-        .expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(0.3f32.into()), 0.1, 1 << 20).expect("a legal grid");
     let set = voxelize(&grid, vec![[Vec3::splat(0.3); 3]]).expect("finite");
-    assert!(
-        set.contains(
-            grid.voxel_containing(DVec3::splat(0.3f32.into()))
-                .expect("inside")
-        )
-    );
+    assert!(set.contains(grid.voxel_containing(DVec3::splat(0.3f32.into())).expect("inside")));
 }
 
 #[test]
@@ -202,27 +166,15 @@ fn a_triangle_across_a_large_grid_is_quadratic() {
     let set = voxelize_snapped([512, 512, 512], 0.0, &[[[0, 0, 0], [n, n, 0], [0, n, n]]]);
     // Half of a diagonal square takes at most some three voxels for each column.
     assert!((130_000..800_000).contains(&set.count()), "{}", set.count());
-    let line = voxelize_snapped(
-        [512, 512, 512],
-        0.0,
-        &[[[0, 0, 0], [n, n, n], [n / 2, n / 2, n / 2]]],
-    );
-    assert!(
-        (512..4 * 512 * 2).contains(&line.count()),
-        "{}",
-        line.count()
-    );
+    let line = voxelize_snapped([512, 512, 512], 0.0, &[[[0, 0, 0], [n, n, n], [n / 2, n / 2, n / 2]]]);
+    assert!((512..4 * 512 * 2).contains(&line.count()), "{}", line.count());
 }
 
 #[test]
 fn tiny_and_needle_triangles_do_not_vanish() {
-    let grid =
-        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
     let at = |t: [[f32; 3]; 3]| voxelize(&grid, vec![t.map(Vec3::from_array)]).expect("finite");
-    assert_eq!(
-        at([[1e-40, 1e-42, 0.0], [1e-45, 1e-41, 0.0], [0.0, -0.0, 1e-45]]).count(),
-        1
-    );
+    assert_eq!(at([[1e-40, 1e-42, 0.0], [1e-45, 1e-41, 0.0], [0.0, -0.0, 1e-45]]).count(), 1);
     let e = f32::EPSILON;
     let needle = at([[0.5, 0.5, 0.5], [7.5, 7.5, 7.5], [7.5, 7.5 + 4.0 * e, 7.5]]);
     assert!((0..8).all(|i| needle.contains(Voxel::new(i, i, i))));
@@ -232,26 +184,12 @@ fn tiny_and_needle_triangles_do_not_vanish() {
 
 #[test]
 fn vertices_that_are_not_finite_are_errors() {
-    let grid =
-        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let result = voxelize(
-            &grid,
-            vec![
-                [Vec3::ONE; 3],
-                [Vec3::ZERO, Vec3::ONE, Vec3::new(0.0, bad, 0.0)],
-            ],
-        );
+        let result = voxelize(&grid, vec![[Vec3::ONE; 3], [Vec3::ZERO, Vec3::ONE, Vec3::new(0.0, bad, 0.0)]]);
         assert_eq!(result, Err(VoxelError::NonFiniteTriangle));
     }
-    let far = voxelize(
-        &grid,
-        vec![[
-            Vec3::splat(f32::MAX),
-            Vec3::splat(f32::MIN),
-            Vec3::new(f32::MAX, 0.0, 0.0),
-        ]],
-    );
+    let far = voxelize(&grid, vec![[Vec3::splat(f32::MAX), Vec3::splat(f32::MIN), Vec3::new(f32::MAX, 0.0, 0.0)]]);
     assert!(far.is_ok_and(|set| (0..8).all(|i| set.contains(Voxel::new(i, i, i)))));
 }
 
@@ -259,31 +197,18 @@ fn vertices_that_are_not_finite_are_errors() {
 #[test]
 #[ignore = "a measurement"]
 fn speed() {
-    let grid =
-        VoxelGrid::covering(DVec3::ZERO, DVec3::splat(256.0), 1.0, 1 << 24).expect("a legal grid");
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(256.0), 1.0, 1 << 24).expect("a legal grid");
     for size in [0.3f32, 3.0, 30.0] {
         let count = 2_000_000 / (size * size).max(1.0) as usize;
         let triangles: Vec<_> = (0..count)
             .map(|n| {
-                let corner = Vec3::new(
-                    (n * 37 % 2200) as f32,
-                    (n * 101 % 2210) as f32,
-                    (n * 53 % 2230) as f32,
-                ) * 0.1;
-                [
-                    corner,
-                    corner + Vec3::new(size, 0.2 * size, 0.1),
-                    corner + Vec3::new(0.1, size, 0.7 * size),
-                ]
+                let corner = Vec3::new((n * 37 % 2200) as f32, (n * 101 % 2210) as f32, (n * 53 % 2230) as f32) * 0.1;
+                [corner, corner + Vec3::new(size, 0.2 * size, 0.1), corner + Vec3::new(0.1, size, 0.7 * size)]
             })
             .collect();
         let start = std::time::Instant::now();
         let set = voxelize(&grid, triangles).expect("finite");
         let seconds = start.elapsed().as_secs_f64();
-        println!(
-            "size {size}: {:.2} M triangles/s, {} voxels",
-            count as f64 / seconds * 1e-6,
-            set.count()
-        );
+        println!("size {size}: {:.2} M triangles/s, {} voxels", count as f64 / seconds * 1e-6, set.count());
     }
 }

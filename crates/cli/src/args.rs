@@ -1,0 +1,128 @@
+//! The command line as typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use vdf_render::{Method, scene::PixelRect};
+
+/// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Render(RenderArgs),
+    Scene(SceneArgs),
+    Compare(CompareArgs),
+}
+
+/// Render a scene to an EXR and a PNG.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  vdf render                                       the built-in scene cbox_vol2
+  vdf render --method amr-sn --voxel 8 -o fog.exr  with a method and a voxel size
+  vdf render scene.xml -D spp=64 --stats fog.json  a Mitsuba 3 scene with a parameter
+  vdf render cbox_vol4 --integrator raymarch --samples-per-segment 49 --spp 4
+
+Exit codes: 0 done, 1 failure while rendering or writing, 2 usage or scene error, 130 interrupted.")]
+pub(crate) struct RenderArgs {
+    /// A scene file (a subset of Mitsuba 3 XML) or the name of a built-in scene [default: cbox_vol2]
+    pub(crate) scene: Option<PathBuf>,
+    /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
+    #[arg(short, long, value_name = "OUT.exr")]
+    pub(crate) output: Option<PathBuf>,
+    /// Acceleration of visibility queries: none, ndf, amr, ndf-sn or amr-sn; the image is the same with all
+    #[arg(long, default_value_t, value_name = "METHOD")]
+    pub(crate) method: Method,
+    /// Side of a voxel in world units [default: a 128th of the scene's longest side]
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
+    pub(crate) voxel: Option<f64>,
+    /// Path tracing of all scattering, or ray marching of single scattering
+    #[arg(long, value_enum, default_value_t = IntegratorName::Volpath)]
+    pub(crate) integrator: IntegratorName,
+    /// Samples on each path segment, for raymarch only [default: 7]
+    #[arg(long, value_name = "N")]
+    pub(crate) samples_per_segment: Option<u32>,
+    /// Samples per pixel [default: the scene's]
+    #[arg(long, value_name = "N")]
+    pub(crate) spp: Option<u32>,
+    /// Seed of the random numbers [default: the scene's]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Number of threads [default: one for each processor]
+    #[arg(short = 'j', long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    /// Set a parameter of the scene file; may be given several times
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
+    pub(crate) defines: Vec<(String, String)>,
+    /// Render only these pixels of the full image (x1 and y1 are one past the last)
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_crop)]
+    pub(crate) crop: Option<PixelRect>,
+    /// Write the statistics as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) stats: Option<PathBuf>,
+    /// No progress and no statistics in words; errors and warnings only
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum IntegratorName {
+    Volpath,
+    Raymarch,
+}
+
+/// List the built-in scenes, or write one to disk.
+#[derive(Debug, Args)]
+pub(crate) struct SceneArgs {
+    #[command(subcommand)]
+    pub(crate) command: SceneCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum SceneCommand {
+    /// List the built-in scenes
+    List,
+    /// Write a built-in scene and its meshes, to edit it or to load it in Mitsuba 3
+    Write {
+        /// Name of the scene
+        name: String,
+        /// Folder to write to; made if it does not exist
+        #[arg(default_value = ".")]
+        folder: PathBuf,
+    },
+}
+
+/// Compare two EXR images: mean squared error, relative mean squared error, and whether they are identical.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "relmse = mean of (A - B)^2 / (B^2 + 0.01 * (mean of B)^2). The exit code is 0 whatever the figures are."
+)]
+pub(crate) struct CompareArgs {
+    /// The image
+    pub(crate) a: PathBuf,
+    /// The reference
+    pub(crate) b: PathBuf,
+}
+
+fn parse_define(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("expected NAME=VALUE".to_owned()),
+    }
+}
+
+fn parse_crop(text: &str) -> Result<PixelRect, String> {
+    let numbers: Vec<u32> = text
+        .split(',')
+        .map(|n| n.trim().parse().map_err(|_| format!("'{n}' is not a number of pixels")))
+        .collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x0, y0, x1, y1] => Ok(PixelRect { x0, y0, x1, y1 }),
+        _ => Err("expected four numbers, X0,Y0,X1,Y1".to_owned()),
+    }
+}

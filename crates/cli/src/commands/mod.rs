@@ -1,0 +1,5 @@
+//! One file a subcommand.
+
+pub(crate) mod compare;
+pub(crate) mod render;
+pub(crate) mod scene;

@@ -1,0 +1,148 @@
+//! `vdf render`.
+
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context as _, anyhow};
+use vdf_render::{
+    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, check_writable, render,
+    scene::{DEFAULT_SCENE, LoadOptions, Scene, builtin, builtin_names},
+    write_atomically, write_exr, write_png,
+};
+
+use crate::{
+    args::{IntegratorName, RenderArgs},
+    failure::Failure,
+    progress::Reporter,
+};
+
+pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let options = options(args)?;
+    let (name, scene) = load(args)?;
+    options.validate(&scene)?;
+    let output = output(args, &name)?;
+    if !args.quiet {
+        for warning in &scene.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+
+    let reporter = Reporter::new(args.quiet)?;
+    let rendering = render(&scene, &options, &reporter);
+    reporter.finish();
+    let rendering = rendering?;
+    // A Ctrl-C after the last tile: the promise is that nothing is written.
+    if reporter.interrupted() {
+        return Err(Failure::Interrupted);
+    }
+
+    write_all(&rendering, &output, args, &name)?;
+    let stdout = &mut std::io::stdout();
+    if !args.quiet {
+        writeln!(stdout, "{}", rendering.statistics)?;
+    }
+    writeln!(stdout, "wrote          {} and {}", output.exr.display(), output.png.display())?;
+    Ok(())
+}
+
+/// Where results go.
+struct Output {
+    exr: PathBuf,
+    png: PathBuf,
+}
+
+fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
+    let integrator = match (args.integrator, args.samples_per_segment) {
+        (IntegratorName::Volpath, None) => IntegratorKind::Volpath,
+        (IntegratorName::Volpath, Some(_)) => {
+            return Err(Failure::Usage(anyhow!("--samples-per-segment goes with --integrator raymarch only")));
+        }
+        (IntegratorName::Raymarch, n) => IntegratorKind::Raymarch { samples_per_segment: n.unwrap_or(7) },
+    };
+    Ok(RenderOptions {
+        method: args.method,
+        voxel_size: args.voxel,
+        integrator,
+        spp: args.spp,
+        seed: args.seed,
+        threads: args.threads,
+        crop: args.crop,
+        ..RenderOptions::default()
+    })
+}
+
+/// The scene and its name: a file if there is one of that path, else a built-in scene.
+fn load(args: &RenderArgs) -> Result<(String, Scene), Failure> {
+    let options = LoadOptions { defines: args.defines.clone() };
+    let path = args.scene.as_deref().unwrap_or(Path::new(DEFAULT_SCENE));
+    let known = path.to_str().and_then(builtin);
+    if let Some(source) = known.filter(|_| args.scene.is_none() || !path.exists()) {
+        return Ok((path.display().to_string(), Scene::from_source(&source, &options)?));
+    }
+    if !path.exists() {
+        let names = builtin_names().join(", ");
+        let path = path.display();
+        return Err(Failure::Usage(anyhow!(
+            "{path}: no such file, nor a built-in scene; the built-in scenes are {names}"
+        )));
+    }
+    let stem = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
+    Ok((stem, Scene::load(path, &options)?))
+}
+
+/// Where to write; fails now rather than after an hour of rendering.
+fn output(args: &RenderArgs, name: &str) -> Result<Output, Failure> {
+    let exr = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.exr")));
+    if exr.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
+        return Err(Failure::Usage(anyhow!(
+            "{}: the output must end in .exr; a .png is written beside it",
+            exr.display()
+        )));
+    }
+    let png = exr.with_extension("png");
+    for path in [Some(&exr), Some(&png), args.stats.as_ref()].into_iter().flatten() {
+        check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+    }
+    Ok(Output { exr, png })
+}
+
+/// Writes the statistics, the PNG and last the EXR, so that who waits for the EXR finds all three.
+fn write_all(rendering: &Rendering, output: &Output, args: &RenderArgs, name: &str) -> Result<(), Failure> {
+    let statistics = &rendering.statistics;
+    if let Some(path) = &args.stats {
+        let json = serde_json::to_string_pretty(statistics)
+            .context("cannot express the statistics as JSON")
+            .map_err(Failure::Work)?;
+        write_atomically(path, |w| writeln!(w, "{json}"))
+            .with_context(|| format!("cannot write {}", path.display()))
+            .map_err(Failure::Work)?;
+    }
+    write_png(&output.png, &rendering.image).map_err(RenderError::from)?;
+    let attributes = attributes(statistics, name);
+    let attributes: Vec<_> = attributes.iter().map(|(n, v)| (*n, v.clone())).collect();
+    write_exr(&output.exr, &rendering.image, &attributes).map_err(RenderError::from)?;
+    Ok(())
+}
+
+/// What the EXR says of its making.
+fn attributes(s: &Statistics, name: &str) -> Vec<(&'static str, AttributeValue)> {
+    let count = |n: u64| AttributeValue::from(n as f64);
+    let mut attributes = vec![
+        ("vdf.version", s.version.into()),
+        ("vdf.scene", name.into()),
+        ("vdf.method", s.method.into()),
+        ("vdf.integrator", s.integrator.into()),
+        ("vdf.samplesPerPixel", i64::from(s.spp).into()),
+        ("vdf.seed", s.seed.to_string().into()),
+        ("vdf.queries", count(s.queries)),
+        ("vdf.spatialQueries", count(s.spatial)),
+        ("vdf.provedQueries", count(s.proved)),
+        ("vdf.buildTimeSeconds", s.t_build.into()),
+        ("vdf.renderTimeSeconds", s.t_render.into()),
+    ];
+    attributes.extend(s.voxel_size.map(|v| ("vdf.voxelSize", v.into())));
+    attributes.extend(s.samples_per_segment.map(|n| ("vdf.samplesPerSegment", i64::from(n).into())));
+    attributes
+}

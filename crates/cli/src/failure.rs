@@ -1,0 +1,56 @@
+//! The one place that decides exit codes.
+
+use std::{io, process::ExitCode};
+
+use vdf_render::RenderError;
+
+/// Why the program ends without success.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The user asked for something that cannot be: exit code 2.
+    Usage(anyhow::Error),
+    /// Rendering, reading or writing failed: exit code 1.
+    Work(anyhow::Error),
+    /// The user interrupted: exit code 130.
+    Interrupted,
+}
+
+impl Failure {
+    /// Prints the message and returns the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        match self {
+            Self::Usage(e) => {
+                eprintln!("error: {e:#}");
+                ExitCode::from(2)
+            }
+            // Whoever reads our output stopped reading: nothing is left to say, and nobody to say it to.
+            Self::Work(e) if e.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe) => {
+                ExitCode::from(1)
+            }
+            Self::Work(e) => {
+                eprintln!("error: {e:#}");
+                ExitCode::from(1)
+            }
+            Self::Interrupted => {
+                eprintln!("interrupted; nothing was written");
+                ExitCode::from(130)
+            }
+        }
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(e: RenderError) -> Self {
+        match e {
+            RenderError::Cancelled => Self::Interrupted,
+            RenderError::Threads { .. } | RenderError::Image(_) => Self::Work(e.into()),
+            _ => Self::Usage(e.into()),
+        }
+    }
+}
+
+impl From<io::Error> for Failure {
+    fn from(e: io::Error) -> Self {
+        Self::Work(anyhow::Error::new(e))
+    }
+}
