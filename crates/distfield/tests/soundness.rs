@@ -35,7 +35,7 @@ fn meets_flat(p: [f64; 2], q: [f64; 2], t: [[f64; 2]; 3]) -> bool {
     inside || segments_meet(p, q, a, b) || segments_meet(p, q, b, c) || segments_meet(p, q, c, a)
 }
 
-/// Exact: does the closed segment touch the closed triangle, degenerate or not?
+/// Exact unless products underflow: does the closed segment touch the closed triangle, degenerate or not?
 fn hits(p: DVec3, q: DVec3, t: [DVec3; 3]) -> bool {
     let [a, b, c] = t;
     let (from, to) = (side3(a, b, c, p), side3(a, b, c, q));
@@ -138,11 +138,13 @@ fn resolve(end: &End, triangles: &[[Vec3; 3]]) -> DVec3 {
             let mut p = (a * wa + b * wb + c * (4.0 - wa - wb)) / 4.0;
             for axis in 0..3 {
                 p[axis] += f64::from(offset[axis]);
-                match steps[axis] {
-                    1 => p[axis] = p[axis].next_up(),
-                    -1 => p[axis] = p[axis].next_down(),
-                    _ => {}
-                }
+                // Next to 0 a step is denormal, and products with it underflow: the predicates are exact only without.
+                p[axis] = match (steps[axis], p[axis] == 0.0) {
+                    (0, _) => p[axis],
+                    (step, true) => f64::from(step) * 1e-30,
+                    (1, false) => p[axis].next_up(),
+                    _ => p[axis].next_down(),
+                };
             }
             p
         }
