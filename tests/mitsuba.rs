@@ -2,9 +2,10 @@
 //!
 //! Means over blocks of 8 × 8 pixels are compared by z = (ours − theirs)/√(variance of both means). Next-event estimation towards
 //! a point light in fog has infinite variance close to the light, so blocks whose reference is not known to 1 % are left out; the rest is close
-//! to normal. A comparison fails beyond 5σ: 6·10⁻⁷ each, 10⁻³ for all 1400 together, if the errors were exactly normal. The mean
-//! of z² over a scene must stay below 1.6; for about 170 comparisons its standard deviation is 0.11, a false alarm of 10⁻⁷. Seeds
-//! are fixed, so a test that passes keeps passing.
+//! to normal. A comparison fails beyond 5σ: 6·10⁻⁷ each, 10⁻³ for all 1300 together, if the errors were exactly normal. The mean
+//! of z² over a scene must stay below 2.1: the channels of a block vary together, so about 60 values are independent, each Student's t² with 31
+//! degrees of freedom (mean 1.07, standard deviation 1.6); their mean has the standard deviation 0.2, and 2.1 is 5 of these. Seeds are
+//! fixed, so a test that passes keeps passing.
 
 mod common;
 
@@ -78,7 +79,7 @@ fn every_block_agrees(name: &str, depth: u32) {
     let mean_z2 = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
     println!("{name}, max_depth {depth}: {} comparisons, worst |z| {worst:.2}, mean z² {mean_z2:.2}", z.len());
     assert!(worst < 5.0, "{name}, max_depth {depth}: a block is {worst:.2} standard errors off");
-    assert!(mean_z2 < 1.6, "{name}, max_depth {depth}: mean z² is {mean_z2:.2}");
+    assert!(mean_z2 < 2.1, "{name}, max_depth {depth}: mean z² is {mean_z2:.2}");
 }
 
 /// Where light is often scattered close to the light, every block has a heavy tail: contributions grow as 1/r² where events become
