@@ -87,7 +87,8 @@ fn every_block_agrees(name: &str, depth: u32) {
 /// that their samples suggest). The mean over all blocks, each weighted by what is known of it, is close enough to normal to be compared.
 fn the_mean_agrees(name: &str, depth: u32) {
     let b = render_blocks(name, depth, 32);
-    let weighted = |values: &[f64]| -> f64 { values.iter().zip(&b.their_variance).map(|(v, variance)| v / variance).sum() };
+    let weighted =
+        |values: &[f64]| -> f64 { values.iter().zip(&b.their_variance).map(|(v, variance)| v / variance).sum() };
     let ours: Vec<f64> = b.ours.iter().map(|seed| weighted(seed)).collect();
     // Σ v/σ² has the variance Σ 1/σ²; the three channels of a block vary together, which makes it up to three times that.
     let their_variance = 3.0 * b.their_variance.iter().map(|v| 1.0 / v).sum::<f64>();
