@@ -1,6 +1,10 @@
 //! The one place that decides exit codes.
 
-use std::{io, process::ExitCode};
+use std::{
+    fmt,
+    io::{self, Write as _},
+    process::ExitCode,
+};
 
 use vdf_render::RenderError;
 
@@ -20,7 +24,7 @@ impl Failure {
     pub(crate) fn report(&self) -> ExitCode {
         match self {
             Self::Usage(e) => {
-                eprintln!("error: {e:#}");
+                say(format_args!("error: {e:#}"));
                 ExitCode::from(2)
             }
             // Whoever reads our output stopped reading: nothing is left to say, and nobody to say it to.
@@ -28,15 +32,20 @@ impl Failure {
                 ExitCode::from(1)
             }
             Self::Work(e) => {
-                eprintln!("error: {e:#}");
+                say(format_args!("error: {e:#}"));
                 ExitCode::from(1)
             }
             Self::Interrupted => {
-                eprintln!("interrupted; nothing was written");
+                say(format_args!("interrupted; nothing was written"));
                 ExitCode::from(130)
             }
         }
     }
+}
+
+/// A line on stderr. Unlike `eprintln!` it does not panic if nobody can read it.
+pub(crate) fn say(line: fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 impl From<RenderError> for Failure {
@@ -49,8 +58,9 @@ impl From<RenderError> for Failure {
     }
 }
 
+/// For `writeln!` to stdout; any other error of the system deserves a better context.
 impl From<io::Error> for Failure {
     fn from(e: io::Error) -> Self {
-        Self::Work(anyhow::Error::new(e))
+        Self::Work(anyhow::Error::new(e).context("cannot write to standard output"))
     }
 }

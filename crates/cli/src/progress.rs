@@ -13,7 +13,7 @@ use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use vdf_render::Progress;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, say};
 
 /// Progress on stderr: a bar on a terminal, else a line now and then, or nothing.
 pub(crate) struct Reporter {
@@ -90,7 +90,7 @@ impl Progress for Reporter {
         {
             *last = Instant::now();
             let total = self.total.load(Ordering::Relaxed).max(1);
-            eprintln!("rendering {} %", 100 * done / total);
+            say(format_args!("rendering {} %", 100 * done / total));
         }
     }
 

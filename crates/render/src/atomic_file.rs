@@ -54,19 +54,10 @@ fn temporary_beside(path: &Path) -> io::Result<NamedTempFile<File>> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    let mut builder = Builder::new();
-    builder.prefix(".vdf-").suffix(".tmp");
-    // A temporary file is private by default, the result should be as readable as any other new file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(directory).map_err(|error| {
-        // tempfile appends the temporary name, which means nothing to the user.
-        let kind = error.kind();
-        match error.raw_os_error() {
-            Some(code) => io::Error::from_raw_os_error(code),
-            None => kind.into(),
-        }
-    })
+    // `tempfile_in` would make the file private and hide the system's message behind the temporary name; the result
+    // should be as readable as any other new file, and the message say what is wrong.
+    let create = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
+    Builder::new().prefix(".vdf-").suffix(".tmp").make_in(directory, create)
 }
 
 #[cfg(test)]

@@ -97,6 +97,6 @@ pub trait Progress: Sync {
     fn pixels_total(&self, n: u64);
     /// `n` more pixels are rendered.
     fn pixels_done(&self, n: u64);
-    /// Whether to stop; asked between tiles.
+    /// Whether to stop; asked often, so it should be quick.
     fn cancelled(&self) -> bool;
 }

@@ -15,8 +15,11 @@ use crate::{
     visibility::{Counters, Proofs, Visibility},
 };
 
-/// Side of a tile in pixels. Only progress and cancellation see tiles.
+/// Side of a tile in pixels. Only progress sees tiles.
 const TILE: u32 = 16;
+
+/// Samples of one pixel between two looks whether to stop: a tile, or even a pixel, may take minutes.
+const SAMPLES_PER_LOOK: u32 = 64;
 
 /// A finished render.
 #[derive(Clone, Debug)]
@@ -123,14 +126,11 @@ impl Job<'_> {
         let rendered: Vec<_> = tiles
             .par_iter()
             .map(|tile| {
-                if progress.cancelled() {
-                    return Err(RenderError::Cancelled);
-                }
-                let result = self.tile(proofs, *tile);
+                let result = self.tile(proofs, *tile, progress)?;
                 progress.pixels_done(result.0.len() as u64);
                 Ok(result)
             })
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<_, RenderError>>()?;
 
         let mut pixels = vec![Rgb::ZERO; width as usize * height as usize];
         let mut counters = Counters::default();
@@ -145,7 +145,12 @@ impl Job<'_> {
         Ok((pixels, counters))
     }
 
-    fn tile<P: Proofs>(&self, proofs: &P, tile: PixelRect) -> (Vec<Rgb>, Counters) {
+    fn tile<P: Proofs>(
+        &self,
+        proofs: &P,
+        tile: PixelRect,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<Rgb>, Counters), RenderError> {
         let integrator = Integrator {
             world: self.world,
             visibility: Visibility::new(&self.world.bvh, proofs),
@@ -157,6 +162,9 @@ impl Job<'_> {
             .map(|(x, y)| {
                 let mut sum = glam::DVec3::ZERO;
                 for sample in 0..self.spp {
+                    if sample % SAMPLES_PER_LOOK == 0 && progress.cancelled() {
+                        return Err(RenderError::Cancelled);
+                    }
                     let radiance = self.sample(&integrator, x, y, sample, &mut counters);
                     counters.paths += 1;
                     if radiance.is_finite() && radiance.min_element() >= 0.0 {
@@ -165,10 +173,10 @@ impl Job<'_> {
                         counters.refused += 1;
                     }
                 }
-                (sum / f64::from(self.spp)).as_vec3()
+                Ok((sum / f64::from(self.spp)).as_vec3())
             })
-            .collect();
-        (pixels, counters)
+            .collect::<Result<_, RenderError>>()?;
+        Ok((pixels, counters))
     }
 
     #[inline]

@@ -14,7 +14,7 @@ use vdf_render::{
 
 use crate::{
     args::{IntegratorName, RenderArgs},
-    failure::Failure,
+    failure::{Failure, say},
     progress::Reporter,
 };
 
@@ -23,10 +23,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let (name, scene) = load(args)?;
     options.validate(&scene)?;
     let output = output(args, &name)?;
-    if !args.quiet {
-        for warning in &scene.warnings {
-            eprintln!("warning: {warning}");
-        }
+    for warning in &scene.warnings {
+        say(format_args!("warning: {warning}"));
     }
 
     let reporter = Reporter::new(args.quiet)?;
@@ -42,8 +40,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let stdout = &mut std::io::stdout();
     if !args.quiet {
         writeln!(stdout, "{}", rendering.statistics)?;
+        writeln!(stdout, "wrote          {} and {}", output.exr.display(), output.png.display())?;
     }
-    writeln!(stdout, "wrote          {} and {}", output.exr.display(), output.png.display())?;
     Ok(())
 }
 
@@ -102,10 +100,19 @@ fn output(args: &RenderArgs, name: &str) -> Result<Output, Failure> {
         )));
     }
     let png = exr.with_extension("png");
+    if let Some(stats) = args.stats.as_ref().filter(|s| is_same(s, &exr) || is_same(s, &png)) {
+        return Err(Failure::Usage(anyhow!("--stats {}: the image is written there", stats.display())));
+    }
     for path in [Some(&exr), Some(&png), args.stats.as_ref()].into_iter().flatten() {
         check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
     }
     Ok(Output { exr, png })
+}
+
+/// Whether both paths name one file, which need not exist yet.
+fn is_same(a: &Path, b: &Path) -> bool {
+    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
+    absolute(a) == absolute(b)
 }
 
 /// Writes the statistics, the PNG and last the EXR, so that who waits for the EXR finds all three.

@@ -1,0 +1,90 @@
+//! Renders that succeed.
+
+use std::{collections::BTreeMap, fs};
+
+use crate::sandbox::Sandbox;
+
+#[test]
+fn writes_image_and_statistics() {
+    let sandbox = Sandbox::new();
+    let outcome = sandbox.render(&["--method", "amr-sn", "-o", "fog.exr", "--stats", "fog.json"]);
+    assert_eq!(sandbox.files(), ["fog.exr", "fog.json", "fog.png"]);
+    assert!(sandbox.read("fog.exr").starts_with(&[0x76, 0x2f, 0x31, 0x01]));
+    assert!(sandbox.read("fog.png").starts_with(b"\x89PNG"));
+    for part in
+        ["16 x 16, 1 spp", "method         amr-sn", "T_build", "p_acc|sp", "wrote          fog.exr and fog.png\n"]
+    {
+        assert!(outcome.stdout.contains(part), "no '{part}' in {}", outcome.stdout);
+    }
+
+    let json: BTreeMap<String, serde_json::Value> = serde_json::from_slice(&sandbox.read("fog.json")).unwrap();
+    assert_eq!(json["method"], "amr-sn");
+    assert_eq!(json["size"], serde_json::json!([16, 16]));
+    assert_eq!(json["paths"], 256);
+    assert_eq!(json["refused"], 0);
+    assert_eq!(json["grid"].as_array().unwrap().len(), 3);
+    assert_eq!(json["neighbourhoods"].as_array().unwrap().len(), 1);
+    let number = |name: &str| json[name].as_f64().unwrap();
+    assert!(number("voxel_size") > 0.0 && number("free_share") < 1.0);
+    assert!(number("proved") <= number("spatial") && number("spatial") <= number("queries"));
+    let proved = number("p_accelerated_given_spatial");
+    assert_eq!(proved, number("proved") / number("spatial"));
+    assert_eq!(number("unknown_fraction"), (number("spatial") - number("proved")) / number("spatial"));
+    assert!(proved > 0.1, "{proved}");
+}
+
+#[test]
+fn statistics_of_the_plain_method() {
+    let sandbox = Sandbox::new();
+    sandbox.render(&["--method", "none", "--stats", "fog.json"]);
+    let json: serde_json::Value = serde_json::from_slice(&sandbox.read("fog.json")).unwrap();
+    assert!(json["grid"].is_null() && json["voxel_size"].is_null());
+    assert_eq!(json["proved"], 0);
+}
+
+#[test]
+fn default_name_is_the_scene_in_the_current_folder() {
+    let sandbox = Sandbox::new();
+    sandbox.render(&[]);
+    assert_eq!(sandbox.files(), ["cbox_vol2.exr", "cbox_vol2.png"]);
+
+    fs::create_dir(sandbox.path().join("folder")).unwrap();
+    sandbox.run(&["scene", "write", "cbox_vol4", "folder"]).succeeded();
+    fs::rename(sandbox.path().join("folder/cbox_vol4.xml"), sandbox.path().join("folder/my room.xml")).unwrap();
+    sandbox.render(&["folder/my room.xml"]);
+    assert_eq!(sandbox.files(), ["cbox_vol2.exr", "cbox_vol2.png", "folder", "my room.exr", "my room.png"]);
+}
+
+#[test]
+fn quiet_says_nothing() {
+    let sandbox = Sandbox::new();
+    let outcome = sandbox.render(&["--quiet", "--stats", "fog.json"]);
+    assert_eq!(outcome.stdout, "");
+    assert_eq!(sandbox.files(), ["cbox_vol2.exr", "cbox_vol2.png", "fog.json"]);
+}
+
+#[test]
+fn results_are_replaced() {
+    let sandbox = Sandbox::new();
+    sandbox.write("fog.exr", "old");
+    sandbox.write("fog.png", "old");
+    sandbox.render(&["-o", "fog.exr"]);
+    assert_eq!(sandbox.files(), ["fog.exr", "fog.png"]);
+    assert!(sandbox.read("fog.exr").len() > 100 && sandbox.read("fog.png").len() > 10);
+}
+
+#[test]
+fn crop_and_raymarch() {
+    let sandbox = Sandbox::new();
+    let outcome = sandbox.render(&["--crop", "2, 3,10,16", "--integrator", "raymarch", "--samples-per-segment", "3"]);
+    assert!(outcome.stdout.contains("8 x 13, 1 spp"), "{}", outcome.stdout);
+    assert!(outcome.stdout.contains("raymarch with 3 samples per segment"), "{}", outcome.stdout);
+}
+
+#[test]
+fn failure_keeps_old_results() {
+    let sandbox = Sandbox::new();
+    sandbox.write("fog.exr", "old");
+    sandbox.fails(&["render", "-o", "fog.exr", "--stats", "no/fog.json"], 1, &["no/fog.json"]);
+    assert_eq!(sandbox.read("fog.exr"), b"old");
+}

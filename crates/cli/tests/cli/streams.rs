@@ -1,0 +1,101 @@
+//! Signals, full devices and closed pipes, as Linux has them.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::sandbox::{Outcome, Sandbox, TINY};
+
+fn full() -> File {
+    OpenOptions::new().write(true).open("/dev/full").unwrap()
+}
+
+/// Seconds of processor time that the child used, in hundredths.
+fn ticks(child: &Child) -> u64 {
+    let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
+    let fields: Vec<_> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
+    fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
+}
+
+#[test]
+fn ctrl_c_stops_inside_a_tile() {
+    let sandbox = Sandbox::new();
+    // One tile of minutes of work.
+    let size = ["render", "-D", "width=16", "-D", "height=16", "--spp", "100000000", "--method", "none"];
+    let args = [&size[..], &["--stats", "fog.json"]].concat();
+    let mut child = sandbox.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while ticks(&child) < 30 && Instant::now() < deadline {
+        thread::sleep(Duration::from_millis(10));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let deadline = Instant::now() + Duration::from_secs(20);
+    while child.try_wait().unwrap().is_none() {
+        if Instant::now() > deadline {
+            child.kill().unwrap();
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+    let outcome = Outcome::new(&args, &child.wait_with_output().unwrap());
+    assert_eq!(outcome.code, Some(130), "{}", outcome.stderr);
+    assert_eq!((outcome.stdout.as_str(), outcome.stderr.as_str()), ("", "interrupted; nothing was written\n"));
+    assert!(sandbox.files().is_empty(), "{:?}", sandbox.files());
+}
+
+#[test]
+fn statistics_to_a_full_device() {
+    let args = [&["render", "--stats", "/dev/full"], &TINY[..]].concat();
+    Sandbox::new().fails(&args, 1, &["cannot write /dev/full: No space left on device"]);
+}
+
+/// The commands that write to stdout.
+fn talkers() -> [(Sandbox, Vec<&'static str>); 4] {
+    let compare = Sandbox::new();
+    compare.render(&["-o", "a.exr"]);
+    [
+        (Sandbox::new(), [&["render"], &TINY[..]].concat()),
+        (Sandbox::new(), vec!["scene", "list"]),
+        (Sandbox::new(), vec!["scene", "write", "cbox_vol2"]),
+        (compare, vec!["compare", "a.exr", "a.exr"]),
+    ]
+}
+
+#[test]
+fn stdout_is_a_full_device() {
+    for (sandbox, args) in talkers() {
+        let output = sandbox.command(&args).stdout(full()).output().unwrap();
+        Outcome::new(&args, &output).failed(1, &["cannot write to standard output: No space left on device"]);
+    }
+}
+
+#[test]
+fn stdout_is_a_closed_pipe() {
+    for (sandbox, args) in talkers() {
+        let (reader, writer) = io::pipe().unwrap();
+        drop(reader);
+        let output = sandbox.command(&args).stdout(writer).output().unwrap();
+        let outcome = Outcome::new(&args, &output);
+        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), ""), "{args:?}");
+    }
+}
+
+#[test]
+fn stderr_is_a_full_device() {
+    let sandbox = Sandbox::new();
+    let status = sandbox.command(&["render", "nothing.xml"]).stderr(full()).status().unwrap();
+    assert_eq!(status.code(), Some(2));
+    let args = [&["render"], &TINY[..]].concat();
+    let status = sandbox.command(&args).stdout(full()).stderr(full()).status().unwrap();
+    assert_eq!(status.code(), Some(1));
+}
+
+#[test]
+fn statistics_to_stdout() {
+    let sandbox = Sandbox::new();
+    let json = sandbox.render(&["--quiet", "--stats", "/dev/stdout"]).stdout;
+    assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()["queries"].as_u64().unwrap() > 0);
+}
