@@ -287,8 +287,7 @@ fn sort_header(bytes: &mut [u8]) -> Option<()> {
 
 /// The sRGB transfer curve (IEC 61966-2-1), quantized to the nearest of 256 levels.
 fn srgb_byte(linear: f32) -> u8 {
-    // `max` returns the other operand for NaN.
-    let linear = linear.max(0.0).min(1.0);
+    let linear = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0).round() as u8
 }

@@ -48,7 +48,7 @@ pub struct LightSample {
     pub weight: Rgb,
     /// Density per steradian; 0 for a point emitter, which no scattered ray can meet.
     pub pdf: f64,
-    /// Whether the point lies on an occluder, so that the query is superficial (Def. 2 in [Houska2013]).
+    /// Whether the point lies on an occluder, so that the query is superficial (Def. 2 in \[Houska2013\]).
     pub on_surface: bool,
 }
 

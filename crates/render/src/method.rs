@@ -7,7 +7,7 @@ use std::{fmt, str::FromStr};
 pub enum Method {
     /// Every query goes to the hierarchy.
     None,
-    /// One chessboard distance a voxel (Def. 8 in [Houska2013]).
+    /// One chessboard distance a voxel (Def. 8 in \[Houska2013\]).
     Ndf,
     /// Anisotropic macro-regions: a chessboard distance for each octant (Def. 9, 10).
     Amr,

@@ -8,7 +8,7 @@ use crate::{
 /// The estimator of light transport.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegratorKind {
-    /// Volumetric path tracing (Sec. 2.3 in [Houska2013]): any number of scattering events.
+    /// Volumetric path tracing (Sec. 2.3 in \[Houska2013\]): any number of scattering events.
     Volpath,
     /// Ray marching (Sec. 2.5): the medium scatters once.
     Raymarch {

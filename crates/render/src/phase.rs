@@ -1,4 +1,4 @@
-//! Phase functions: isotropic and Henyey–Greenstein [Henyey1941].
+//! Phase functions: isotropic and Henyey–Greenstein \[Henyey1941\].
 //!
 //! `wo` is the direction of propagation before the event, `wi` the direction after it; both are unit vectors. (Mitsuba's
 //! `wi` points back along the ray, hence the other sign of the cosine there.)

@@ -1,6 +1,6 @@
 //! Random numbers as a pure function of (seed, pixel, sample, dimension).
 //!
-//! Idea: SplitMix64 [Steele2014] used as a counter-based generator: a 128-bit key is hashed from seed, pixel and
+//! Idea: SplitMix64 \[Steele2014\] used as a counter-based generator: a 128-bit key is hashed from seed, pixel and
 //! sample; dimension i is the finalizer of the i-th element of the key's Weyl sequence, with the key's other half mixed in
 //! between the rounds so that no two keys share a sequence. No state is shared, so nothing depends on threads or tiles.
 

@@ -33,7 +33,7 @@ pub struct Statistics {
     pub t_field: f64,
     /// Time to build the neighbourhoods.
     pub t_neighbourhoods: f64,
-    /// `T_build`, what the method costs before the first query: voxels, field and neighbourhoods (Sec. 2.6 in [Houska2013]).
+    /// `T_build`, what the method costs before the first query: voxels, field and neighbourhoods (Sec. 2.6 in \[Houska2013\]).
     pub t_build: f64,
     /// `T_render` without `T_build`.
     pub t_render: f64,

@@ -58,7 +58,7 @@ impl<F: SafeZones> Proofs for FieldProofs<F> {
     }
 }
 
-/// The methods `-sn`: for each point emitter one bit a voxel (Def. 14 in [Houska2013]); other emitters ask the field.
+/// The methods `-sn`: for each point emitter one bit a voxel (Def. 14 in \[Houska2013\]); other emitters ask the field.
 #[derive(Debug)]
 pub struct NeighbourhoodProofs<F> {
     /// The field and its grid.
@@ -92,7 +92,7 @@ pub struct ShadowQuery {
     pub to: DVec3,
     /// Number of the emitter.
     pub emitter: usize,
-    /// Whether neither end lies on an occluder (Def. 2 in [Houska2013]); only such queries can be proved.
+    /// Whether neither end lies on an occluder (Def. 2 in \[Houska2013\]); only such queries can be proved.
     pub spatial: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The fallback: a bounding volume hierarchy (obvhs [Ylitie2017, Meister2018]) over exact triangle tests.
+//! The fallback: a bounding volume hierarchy (obvhs \[Ylitie2017, Meister2018\]) over exact triangle tests.
 //!
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test,
 //! so it never culls a triangle that the exact test would hit, and ties are broken by the triangle's number: no

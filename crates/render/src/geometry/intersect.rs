@@ -1,15 +1,15 @@
 //! The reference intersector: does a closed segment meet a triangle?
 //!
-//! Idea: the watertight test of [Woop2013] (translate the segment's start to the origin, shear its direction onto
+//! Idea: the watertight test of \[Woop2013\] (translate the segment's start to the origin, shear its direction onto
 //! an axis, look at three 2D edge functions), in double precision, with a filter: every sign that rounding could
-//! have changed is decided again by exact predicates [Shewchuk1997].
+//! have changed is decided again by exact predicates \[Shewchuk1997\].
 //!
 //! Guarantee: whether a segment meets a triangle is answered *exactly* for the single-precision vertices of the
 //! triangle and the double-precision end points of the segment. So the reach of the intersector's errors, which the
 //! voxelization has to cover, is zero; the test is watertight; and it gives the same answer for a reversed segment.
 //! Only the position of a hit is rounded.
 //!
-//! *Deviation:* [Woop2013] computes in single precision and repeats an edge function in double precision if it is
+//! *Deviation:* \[Woop2013\] computes in single precision and repeats an edge function in double precision if it is
 //! zero. That leaves an error of some ulps of the largest sheared coordinate in the decision, and an unbounded one
 //! in `t` for triangles seen edge-on, which no dilation could cover.
 //!

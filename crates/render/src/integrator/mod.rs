@@ -161,7 +161,7 @@ impl Vertex {
     }
 }
 
-/// The weight of a sample drawn with density `pdf` where another strategy has density `other` (power heuristic, β = 2 [Veach1997]).
+/// The weight of a sample drawn with density `pdf` where another strategy has density `other` (power heuristic, β = 2 \[Veach1997\]).
 #[inline]
 fn power_heuristic(pdf: f64, other: f64) -> f64 {
     // As a ratio, so that large densities do not overflow; both zero is worth nothing.

@@ -1,4 +1,4 @@
-//! `raymarch`: stratified single scattering on every ray, summed with the light of surfaces (Sec. 2.5 in [Houska2013]).
+//! `raymarch`: stratified single scattering on every ray, summed with the light of surfaces (Sec. 2.5 in \[Houska2013\]).
 //!
 //! Each ray is divided into strata of equal transmittance; in each, one sample gathers light from one emitter. The medium scatters once, emitted
 //! light only; surfaces scatter any number of times. With T the transmittance of the ray, the k-th of n samples lies at the optical

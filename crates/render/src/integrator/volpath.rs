@@ -1,4 +1,4 @@
-//! `volpath`: unidirectional volumetric path tracing (Sec. 2.3 in [Houska2013]; depth rules of Mitsuba 3 `volpath`).
+//! `volpath`: unidirectional volumetric path tracing (Sec. 2.3 in \[Houska2013\]; depth rules of Mitsuba 3 `volpath`).
 //!
 //! On each ray a free-flight distance is drawn. If it ends before the first surface the path scatters in the medium, else on the surface.
 //! Light is gathered at each event from one emitter sample and, by multiple importance sampling, from the scattered ray.
