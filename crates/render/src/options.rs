@@ -54,6 +54,9 @@ impl Default for RenderOptions {
     }
 }
 
+/// Tens of thousands of threads do not speed up anything but make the system refuse to start them, or stall.
+const MAX_THREADS: usize = 4096;
+
 impl RenderOptions {
     /// Checks what can be checked before anything is built.
     ///
@@ -66,6 +69,9 @@ impl RenderOptions {
         }
         if self.threads == Some(0) {
             return fail("threads", "must be at least 1".into());
+        }
+        if self.threads.is_some_and(|n| n > MAX_THREADS) {
+            return fail("threads", format!("must be at most {MAX_THREADS}"));
         }
         if let Some(size) = self.voxel_size
             && !(size.is_finite() && size > 0.0)

@@ -31,7 +31,7 @@ fn missing_mesh() {
 
 #[test]
 fn unknown_element() {
-    scene_fails("<scene version=\"3.0.0\">\n  <gizmo/>\n</scene>\n", &["bad.xml:2:", "gizmo"]);
+    scene_fails("<scene version=\"3.0.0\">\n  <gizmo/>\n</scene>\n", &["bad.xml:2:3: <gizmo> is not supported"]);
 }
 
 #[test]
@@ -92,6 +92,7 @@ fn options_out_of_range() {
     sandbox.fails(&["render", "--spp", "-1"], 2, &["-1"]);
     sandbox.fails(&["render", "--spp", "4294967296"], 2, &["4294967296"]);
     render_fails(&["-j", "0"], 2, &["--threads must be at least 1"]);
+    render_fails(&["-j", "70000"], 2, &["--threads must be at most 4096"]);
     render_fails(&["--seed", "x"], 2, &["--seed"]);
     render_fails(&["--method", "magic"], 2, &["magic", "amr-sn"]);
     render_fails(&["--integrator", "magic"], 2, &["magic", "volpath"]);
