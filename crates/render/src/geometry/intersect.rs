@@ -64,16 +64,16 @@ pub struct TriangleHit {
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentTest {
     segment: Segment,
-    /// The axes x, y, z of the sheared space; z is the one along which the segment is longest.
-    axes: [usize; 3],
-    shear_x: f64,
-    shear_y: f64,
-    scale_z: f64,
+    /// The rows of the shear: a sheared coordinate is the dot product of one with a difference of points. Choosing
+    /// axes by multiplication with 0 and 1 is exact, and faster than by index.
+    rows: [DVec3; 3],
     /// Largest error of an edge function, for triangles in the bounds given.
     edge_error: f64,
     /// Largest error of `T` and of `T − det`, see [`SegmentTest::intersect`].
     t_error: f64,
 }
+
+const AXES: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
 
 /// Half an ulp of 1 in double precision.
 const U: f64 = f64::EPSILON / 2.0;
@@ -113,10 +113,7 @@ impl SegmentTest {
         let m2 = m * m;
         Self {
             segment,
-            axes: [x, y, z],
-            shear_x: d[x] * scale_z,
-            shear_y: d[y] * scale_z,
-            scale_z,
+            rows: [AXES[x] - AXES[z] * (d[x] * scale_z), AXES[y] - AXES[z] * (d[y] * scale_z), AXES[z] * scale_z],
             edge_error: if usable { 128.0 * U * m2 } else { f64::INFINITY },
             t_error: 1024.0 * U * m2 * (m * scale_z.abs()).max(1.0),
         }
@@ -130,7 +127,7 @@ impl SegmentTest {
     }
 
     /// Exactly: do segment and triangle meet? If so, where (rounded)?
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn intersect(&self, triangle: &Triangle) -> Option<TriangleHit> {
         let [a, b, c] = triangle.vertices_f64().map(|v| self.sheared(v));
@@ -164,9 +161,8 @@ impl SegmentTest {
     /// The vertex relative to the start, sheared so that the segment runs along z from 0 to 1.
     #[inline]
     fn sheared(&self, v: DVec3) -> [f64; 3] {
-        let v = (v - self.segment.p).to_array();
-        let z = v[self.axes[2]];
-        [v[self.axes[0]] - self.shear_x * z, v[self.axes[1]] - self.shear_y * z, z * self.scale_z]
+        let v = v - self.segment.p;
+        self.rows.map(|row| row.dot(v))
     }
 }
 
