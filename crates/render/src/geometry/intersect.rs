@@ -135,12 +135,15 @@ impl SegmentTest {
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];
         let e = self.edge_error;
-        let lowest = u.min(v).min(w);
-        let highest = u.max(v).max(w);
-        if lowest < -e && highest > e {
+        // Comparisons without branches between them; all are false for NaN, which leaves it to the exact test.
+        let positive = [u > e, v > e, w > e];
+        let negative = [u < -e, v < -e, w < -e];
+        let any = |signs: [bool; 3]| signs[0] | signs[1] | signs[2];
+        let all = |signs: [bool; 3]| signs[0] & signs[1] & signs[2];
+        if any(positive) & any(negative) {
             return None;
         }
-        if lowest > e || highest < -e {
+        if all(positive) | all(negative) {
             let det = u + v + w;
             let sign = det.signum();
             let t_det = (u * a[2] + v * b[2] + w * c[2]) * sign;
