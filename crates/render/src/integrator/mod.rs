@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use crate::{
     Rgb, Sampler,
-    geometry::Segment,
+    frame::sample_cosine_hemisphere,
+    geometry::{Hit, Segment},
     scene::{IntegratorSettings, MediumId, Phase},
     visibility::{Counters, Proofs, ShadowQuery, Visibility},
     world::{SurfacePoint, World},
@@ -41,6 +42,27 @@ enum Origin {
     Scattering { point: DVec3, pdf: f64 },
 }
 
+/// A path under way from the camera.
+#[derive(Clone, Copy, Debug)]
+struct Path {
+    /// The ray that is followed.
+    ray: PathRay,
+    /// How its direction was drawn.
+    origin: Origin,
+    /// Scattering events so far; passing a medium boundary is none.
+    depth: u32,
+    /// What light that arrives along the ray is worth at the camera.
+    throughput: Rgb,
+    /// Light gathered so far.
+    radiance: Rgb,
+}
+
+impl Path {
+    const fn new(ray: PathRay) -> Self {
+        Self { ray, origin: Origin::Camera, depth: 0, throughput: Rgb::ONE, radiance: Rgb::ZERO }
+    }
+}
+
 /// The end of a path so far, where light may be gathered.
 #[derive(Clone, Copy, Debug)]
 enum Vertex {
@@ -53,6 +75,55 @@ impl<P: Proofs> Integrator<'_, P> {
     #[inline]
     fn may_scatter(&self, depth: u32) -> bool {
         self.settings.max_depth.is_none_or(|m| depth < m)
+    }
+
+    /// True if the path goes on along its ray: it is not too long, worth something, and survives Russian roulette.
+    #[inline]
+    fn goes_on(&self, path: &mut Path, sampler: &mut Sampler) -> bool {
+        self.may_scatter(path.depth)
+            && path.throughput != Rgb::ZERO
+            && survives(&mut path.throughput, path.depth, self.settings.rr_depth, sampler)
+    }
+
+    /// The first occluder on the ray, and the part of the ray before it.
+    #[inline]
+    fn cast(&self, ray: &PathRay) -> (Option<Hit>, Segment) {
+        let hit = self.visibility.intersect(&ray.segment);
+        let free = match &hit {
+            Some(hit) => Segment::new(ray.segment.p, ray.segment.at(hit.t)),
+            None => ray.segment,
+        };
+        (hit, free)
+    }
+
+    /// The event at the end of a ray that was not stopped by a medium: light of the background or the surface is gathered, and the
+    /// path scatters. False if it ends here.
+    #[inline]
+    fn arrive(
+        &self,
+        path: &mut Path,
+        hit: Option<Hit>,
+        medium: Option<MediumId>,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> bool {
+        let Some(hit) = hit else {
+            path.radiance += path.throughput * self.background(&path.origin);
+            return false;
+        };
+        let surface = self.world.surface_point(&hit, path.ray.direction);
+        path.radiance += path.throughput * self.emitted(&surface, path.ray.direction, &path.origin);
+        path.depth += 1;
+        if !self.may_scatter(path.depth) {
+            return false;
+        }
+        let vertex = Vertex::OnSurface(surface);
+        path.radiance += path.throughput * self.direct_light(surface.point, &vertex, medium, sampler, counters);
+        let (direction, pdf) = sample_cosine_hemisphere(surface.normal, sampler.next_2d());
+        path.throughput *= surface.reflectance;
+        path.origin = Origin::Scattering { point: surface.point, pdf };
+        path.ray = self.ray(surface.point, direction, medium);
+        true
     }
 
     /// Next-event estimation where direction sampling may find the same light: weighted by the power heuristic.

@@ -7,10 +7,9 @@
 //! *Deviation from the thesis:* it recovers σ_t as −ln(T)/D, which loses all digits in thin media and is undefined where T underflows. Here the
 //! optical depth τ is known, and 1 − T = −expm1(−τ).
 
-use super::{Integrator, Origin, PathRay, Vertex, survives, to_f32};
+use super::{Integrator, Path, PathRay, Vertex, to_f32};
 use crate::{
     Rgb, Sampler,
-    frame::sample_cosine_hemisphere,
     geometry::Segment,
     media::Flight,
     visibility::{Counters, Proofs},
@@ -19,47 +18,23 @@ use crate::{
 impl<P: Proofs> Integrator<'_, P> {
     /// Radiance along `ray` by ray marching with `samples` strata a segment (at least 1).
     pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
-        let mut radiance = Rgb::ZERO;
-        let mut throughput = Rgb::ONE;
-        let mut ray = ray;
-        let mut origin = Origin::Camera;
-        let mut depth = 0;
-        while self.may_scatter(depth) && throughput != Rgb::ZERO {
-            if !survives(&mut throughput, depth, self.settings.rr_depth, sampler) {
-                break;
+        let mut path = Path::new(ray);
+        while self.goes_on(&mut path, sampler) {
+            let (hit, free) = self.cast(&path.ray);
+            let tau = self.world.media.optical_depth(&free, path.ray.medium);
+            if tau > 0.0 && self.may_scatter(path.depth + 1) {
+                path.radiance += path.throughput * self.in_scattered(&free, &path.ray, tau, samples, sampler, counters);
             }
-            let hit = self.visibility.intersect(&ray.segment);
-            let free = match &hit {
-                Some(hit) => Segment::new(ray.segment.p, ray.segment.at(hit.t)),
-                None => ray.segment,
-            };
-            let tau = self.world.media.optical_depth(&free, ray.medium);
-            if tau > 0.0 && self.may_scatter(depth + 1) {
-                radiance += throughput * self.in_scattered(&free, &ray, tau, samples, sampler, counters);
-            }
-            let medium = match self.world.media.fly(&free, ray.medium, f64::INFINITY) {
+            let medium = match self.world.media.fly(&free, path.ray.medium, f64::INFINITY) {
                 Flight::Passed(medium) => medium,
                 Flight::Collision { medium, .. } => Some(medium),
             };
-            throughput *= to_f32((-tau).exp());
-            let Some(hit) = hit else {
-                radiance += throughput * self.background(&origin);
-                break;
-            };
-            let surface = self.world.surface_point(&hit, ray.direction);
-            radiance += throughput * self.emitted(&surface, ray.direction, &origin);
-            depth += 1;
-            if !self.may_scatter(depth) {
+            path.throughput *= to_f32((-tau).exp());
+            if !self.arrive(&mut path, hit, medium, sampler, counters) {
                 break;
             }
-            let vertex = Vertex::OnSurface(surface);
-            radiance += throughput * self.direct_light(surface.point, &vertex, medium, sampler, counters);
-            let (direction, pdf) = sample_cosine_hemisphere(surface.normal, sampler.next_2d());
-            throughput *= surface.reflectance;
-            origin = Origin::Scattering { point: surface.point, pdf };
-            ray = self.ray(surface.point, direction, medium);
         }
-        radiance
+        path.radiance
     }
 
     /// Emitted light scattered once into the ray along `free`, whose optical depth is `tau`.
