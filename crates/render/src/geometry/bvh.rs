@@ -3,6 +3,10 @@
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test,
 //! so it never culls a triangle that the exact test would hit, and ties are broken by the triangle's number: no
 //! answer depends on the shape of the tree.
+//!
+//! The tree has a space of its own: world coordinates times a power of two, so that the largest is about 1. Then its single
+//! precision neither overflows nor underflows whatever the unit of the scene, and the absolute constants inside obvhs have
+//! one known weight.
 
 use std::time::Duration;
 
@@ -10,7 +14,7 @@ use glam::{DVec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
-    bvh2::{Bvh2, builder::build_bvh2},
+    cwbvh::{CwBvh, builder::build_cwbvh},
     ray::{Ray, RayHit},
 };
 
@@ -30,7 +34,7 @@ pub struct Hit {
 
 /// A hierarchy over triangles; immutable and shared by all threads.
 pub struct Bvh {
-    tree: Bvh2,
+    tree: CwBvh,
     /// In the order of the tree's leaves, for locality.
     triangles: Vec<Triangle>,
     /// The number that each of `triangles` had when it was given.
@@ -38,7 +42,9 @@ pub struct Bvh {
     /// Bounds of all triangles; `min > max` if there are none.
     min: DVec3,
     max: DVec3,
-    /// By how much the tree's boxes are larger than the triangles.
+    /// Tree coordinates per world unit, a power of two.
+    scale: f64,
+    /// By how much the tree's boxes are larger than the triangles, in world units.
     pad: f64,
 }
 
@@ -52,15 +58,23 @@ impl std::fmt::Debug for Bvh {
     }
 }
 
-/// Padding of boxes in relation to the largest coordinate. With rays that start in the padded bounds, a point on the
-/// ray in a box test is off by at most (in units of 2⁻²⁴ times the largest coordinate m, rays being no longer than
-/// the bounds' diagonal of 2√3·m): origin 1, direction 2·2√3, obvhs's clamp of small direction components 2·2√3,
-/// three roundings of the slab test 3·2√3 + 3. That is below 32; twice as much is taken.
+/// Padding of boxes in tree coordinates, where the largest coordinate m is below 1. With rays that start in the padded
+/// bounds, and so are no longer than their diagonal of 2√3, a point on the ray in a box test is off by at most (in units of
+/// 2⁻²⁴): origin 1, direction 2·2√3, clamp of small direction components 2·2√3, quantization of the boxes 2, the slab test
+/// (p − o)/d + q/d: three roundings of a term of at most 2, two of another, one of the sum 2√3. That is below 33; about twice as much is taken.
 const PAD: f64 = 64.0 / 16_777_216.0;
+
+/// Length of a ray's direction in tree coordinates. obvhs takes no box that a ray leaves before 10⁻⁴ in its parameter; a ray that meets
+/// a triangle stays in its padded box for at least `PAD`, which is 2⁻⁶ in the parameter.
+const SPEED: f64 = 1.0 / 4096.0;
+
+/// The smallest component of a direction in relation to its length; keeps reciprocals finite.
+const SMALLEST_COMPONENT: f32 = (SPEED * f32::EPSILON as f64) as f32;
 
 impl Bvh {
     /// Builds the hierarchy. Cost: O(n log n); about 1 µs a triangle.
     #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding to single precision")]
     pub fn new(triangles: &[Triangle]) -> Self {
         let mut min = DVec3::INFINITY;
         let mut max = DVec3::NEG_INFINITY;
@@ -69,25 +83,23 @@ impl Bvh {
             max = max.max(v);
         }
         let largest = if triangles.is_empty() { 0.0 } else { min.abs().max(max.abs()).max_element() };
-        let pad = PAD * largest;
-        // The boxes are padded in single precision, where adding the pad may lose half an ulp of the 64.
-        #[allow(clippy::cast_possible_truncation, reason = "rounding is part of the padding's budget")]
-        let pad_f32 = pad as f32;
+        // Vertices are single precision, so the exponent is at most 128 and at least −149.
+        let scale = if largest > 0.0 { (-largest.log2().floor() - 1.0).exp2() } else { 1.0 };
         let boxes: Vec<Aabb> = triangles
             .iter()
             .map(|t| {
                 let mut b = Aabb::empty();
-                for v in t.vertices {
-                    b.extend(Vec3A::from(v));
+                for v in t.vertices_f64() {
+                    b.extend(Vec3A::from((v * scale).as_vec3()));
                 }
-                Aabb::new(b.min - pad_f32, b.max + pad_f32)
+                Aabb::new(b.min - PAD as f32, b.max + PAD as f32)
             })
             .collect();
         let mut core_time = Duration::ZERO;
-        let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut core_time);
+        let tree = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut core_time);
         let numbers = tree.primitive_indices.clone();
         let ordered = numbers.iter().map(|&i| triangles[i as usize]).collect();
-        Self { tree, triangles: ordered, numbers, min, max, pad }
+        Self { tree, triangles: ordered, numbers, min, max, scale, pad: PAD / scale }
     }
 
     /// Bounds of the triangles, `None` if there are none.
@@ -110,8 +122,7 @@ impl Bvh {
                     best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
                 }
                 // Boxes beyond the hit are culled; those within rounding of it are not.
-                #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-                return ((hit.t * length - start) * (1.0 + 1e-6) + self.pad) as f32;
+                return self.ray_parameter(hit.t * length - start);
             }
             f32::INFINITY
         });
@@ -144,10 +155,11 @@ impl Bvh {
     /// The tree's ray for a segment, the distance of its start from the segment's, and the segment's length;
     /// `None` if the segment misses the padded bounds or has no length.
     #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
     fn ray(&self, segment: &Segment) -> Option<(Ray, f64, f64)> {
         let d = segment.q - segment.p;
         let length = d.length();
-        let direction = d / length;
+        let direction = d * (1.0 / length);
         if !(length > 0.0 && direction.is_finite()) {
             return None;
         }
@@ -163,10 +175,24 @@ impl Bvh {
             }
             start = near.max(0.0);
         }
-        let origin = segment.p + direction * start;
-        #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-        let reach = ((length - start) * (1.0 + 1e-6) + self.pad) as f32;
-        let ray = Ray::new(Vec3A::from(origin.as_vec3()), Vec3A::from(direction.as_vec3()), 0.0, reach);
+        let origin = (segment.p + direction * start) * self.scale;
+        let direction = Vec3A::from((direction * SPEED).as_vec3());
+        let small = direction.abs().cmple(Vec3A::splat(SMALLEST_COMPONENT));
+        let clamped = Vec3A::select(small, direction.signum() * SMALLEST_COMPONENT, direction);
+        let ray = Ray {
+            origin: Vec3A::from(origin.as_vec3()),
+            direction: clamped,
+            inv_direction: clamped.recip(),
+            tmin: 0.0,
+            tmax: self.ray_parameter(length - start),
+        };
         Some((ray, start, length))
+    }
+
+    /// The parameter of a tree's ray at this distance from its start, rounded up by more than the rounding of a box test.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
+    fn ray_parameter(&self, distance: f64) -> f32 {
+        ((distance * (1.0 + 1e-6) + self.pad) * (self.scale / SPEED)) as f32
     }
 }

@@ -82,13 +82,23 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2_000))]
 
     #[test]
-    fn hierarchy_agrees_with_a_loop(triangles in prop::collection::vec(triangle(), 0..40), p in point(), q in point(), aim in any::<prop::sample::Index>(), k in 0..3_usize) {
+    fn hierarchy_agrees_with_a_loop(
+        triangles in prop::collection::vec(triangle(), 0..40), p in point(), q in point(), near in point(),
+        aim in any::<prop::sample::Index>(), k in 0..3_usize, unit in prop::sample::select(vec![0_i32, -7, -20, -100, 90]),
+    ) {
+        // The same in any unit.
+        let unit = f32::from_bits(u32::try_from(127 + unit).expect("a positive exponent") << 23);
+        let triangles: Vec<_> =
+            triangles.iter().map(|t| Triangle { vertices: t.vertices.map(|v| v * unit) }).collect();
+        let (p, q, near) = (p * unit, q * unit, near * unit * 1e-5);
         let bvh = Bvh::new(&triangles);
         let mut segments = vec![Segment::new(p.as_dvec3(), q.as_dvec3()), Segment::new(p.as_dvec3() * 1e3, q.as_dvec3())];
         if !triangles.is_empty() {
             let target = triangles[aim.index(triangles.len())].vertices_f64()[k];
             segments.push(Segment::new(p.as_dvec3(), target));
             segments.push(Segment::new(p.as_dvec3() * 1e3, target));
+            // So short that it is inside the padding.
+            segments.push(Segment::new(target + near.as_dvec3(), target - near.as_dvec3() * 0.5));
         }
         for s in segments {
             let first = triangles.iter().filter_map(|t| intersect_exact(&s, t)).map(|h| h.t).min_by(f64::total_cmp);
