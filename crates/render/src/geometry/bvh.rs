@@ -64,11 +64,11 @@ impl std::fmt::Debug for Bvh {
 /// (p − o)/d + q/d: three roundings of a term of at most 2, two of another, one of the sum 2√3. That is below 33; about twice as much is taken.
 const PAD: f64 = 64.0 / 16_777_216.0;
 
-/// Length of a ray's direction in tree coordinates. obvhs takes no box that a ray leaves before 10⁻⁴ in its parameter; a ray that meets
-/// a triangle stays in its padded box for at least `PAD`, which is 2⁻⁶ in the parameter.
+/// Largest component of a ray's direction in tree coordinates. obvhs takes no box that a ray leaves before 10⁻⁴ in its parameter; a ray that meets
+/// a triangle stays in its padded box for at least `PAD`, which is at least 2⁻⁷ in the parameter.
 const SPEED: f64 = 1.0 / 4096.0;
 
-/// The smallest component of a direction in relation to its length; keeps reciprocals finite.
+/// The smallest component of a direction, 2⁻²³ of the largest; keeps reciprocals finite.
 const SMALLEST_COMPONENT: f32 = (SPEED * f32::EPSILON as f64) as f32;
 
 impl Bvh {
@@ -112,8 +112,8 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
-        let (ray, start, length) = self.ray(segment)?;
         let test = SegmentTest::new(*segment, self.min, self.max);
+        let (ray, start) = self.ray(&test)?;
         let mut best: Option<Hit> = None;
         self.tree.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
@@ -122,7 +122,7 @@ impl Bvh {
                     best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
                 }
                 // Boxes beyond the hit are culled; those within rounding of it are not.
-                return self.ray_parameter(hit.t * length - start);
+                return self.ray_parameter(hit.t * test.length() - start);
             }
             f32::INFINITY
         });
@@ -133,8 +133,8 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn occluded(&self, segment: &Segment) -> bool {
-        let Some((ray, _, _)) = self.ray(segment) else { return false };
         let test = SegmentTest::new(*segment, self.min, self.max);
+        let Some((ray, _)) = self.ray(&test) else { return false };
         !self.tree.ray_traverse_miss(ray, |_, slot| {
             if test.intersect(&self.triangles[slot]).is_some() { f32::NEG_INFINITY } else { f32::INFINITY }
         })
@@ -143,8 +143,8 @@ impl Bvh {
     /// Calls `visit` with every triangle that the closed segment meets, in no particular order.
     #[inline]
     pub fn visit_hits(&self, segment: &Segment, mut visit: impl FnMut(Hit)) {
-        let Some((ray, _, _)) = self.ray(segment) else { return };
         let test = SegmentTest::new(*segment, self.min, self.max);
+        let Some((ray, _)) = self.ray(&test) else { return };
         self.tree.ray_traverse_anyhit(ray, |_, slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
                 visit(Hit { triangle: self.numbers[slot], t: hit.t, barycentric: hit.barycentric });
@@ -152,44 +152,44 @@ impl Bvh {
         });
     }
 
-    /// The tree's ray for a segment, the distance of its start from the segment's, and the segment's length;
-    /// `None` if the segment misses the padded bounds or has no length.
+    /// The tree's ray for a segment, and where it starts: the distance from the segment's start along its largest component; `None`
+    /// if the segment misses the padded bounds or has no length.
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-    fn ray(&self, segment: &Segment) -> Option<(Ray, f64, f64)> {
-        let d = segment.q - segment.p;
-        let length = d.length();
-        let direction = d * (1.0 / length);
-        if !(length > 0.0 && direction.is_finite()) {
+    fn ray(&self, test: &SegmentTest) -> Option<(Ray, f64)> {
+        let direction = test.direction();
+        if !(test.length() > 0.0 && direction.is_finite()) {
             return None;
         }
         let (min, max) = (self.min - self.pad, self.max + self.pad);
         let mut start = 0.0;
-        if !(segment.p.cmpge(min).all() && segment.p.cmple(max).all()) {
+        let mut origin = test.segment().p;
+        if !(origin.cmpge(min).all() && origin.cmple(max).all()) {
             let inv = direction.recip();
-            let (t0, t1) = ((min - segment.p) * inv, (max - segment.p) * inv);
+            let (t0, t1) = ((min - origin) * inv, (max - origin) * inv);
             // A direction parallel to a slab gives NaN on its border: `min` and `max` then keep the other operand.
             let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
-            if near > far || near > length || far < 0.0 {
+            if near > far || near > test.length() || far < 0.0 {
                 return None;
             }
             start = near.max(0.0);
+            origin += direction * start;
         }
-        let origin = (segment.p + direction * start) * self.scale;
         let direction = Vec3A::from((direction * SPEED).as_vec3());
         let small = direction.abs().cmple(Vec3A::splat(SMALLEST_COMPONENT));
-        let clamped = Vec3A::select(small, direction.signum() * SMALLEST_COMPONENT, direction);
+        let direction = Vec3A::select(small, direction.signum() * SMALLEST_COMPONENT, direction);
         let ray = Ray {
-            origin: Vec3A::from(origin.as_vec3()),
-            direction: clamped,
-            inv_direction: clamped.recip(),
+            origin: Vec3A::from((origin * self.scale).as_vec3()),
+            direction,
+            inv_direction: direction.recip(),
             tmin: 0.0,
-            tmax: self.ray_parameter(length - start),
+            tmax: self.ray_parameter(test.length() - start),
         };
-        Some((ray, start, length))
+        Some((ray, start))
     }
 
-    /// The parameter of a tree's ray at this distance from its start, rounded up by more than the rounding of a box test.
+    /// The parameter of a tree's ray at this distance from its start (measured along the largest component), rounded up by more than the
+    /// rounding of a box test.
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
     fn ray_parameter(&self, distance: f64) -> f32 {

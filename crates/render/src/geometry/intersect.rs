@@ -64,6 +64,10 @@ pub struct TriangleHit {
 #[derive(Clone, Copy, Debug)]
 pub struct SegmentTest {
     segment: Segment,
+    /// The segment's direction in units of its largest component; zero for a segment of length zero.
+    direction: DVec3,
+    /// That component's size, in world units.
+    length: f64,
     /// The rows of the shear: a sheared coordinate is the dot product of one with a difference of points. Choosing
     /// axes by multiplication with 0 and 1 is exact, and faster than by index.
     rows: [DVec3; 3],
@@ -101,6 +105,7 @@ impl SegmentTest {
         };
         // Cyclic order keeps the orientation; a negative z would mirror, so x and y are exchanged.
         let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
+        let vector = d;
         let d = d.to_array();
         if d[z] < 0.0 {
             std::mem::swap(&mut x, &mut y);
@@ -109,10 +114,14 @@ impl SegmentTest {
         let scale_z = if d[z] == 0.0 { 0.0 } else { 1.0 / d[z] };
         // So short a segment that its reciprocal overflows: infinite error bounds leave all to the exact test.
         let usable = scale_z.is_finite();
+        let length = d[z].abs();
+        let direction = if usable { vector * scale_z.abs() } else { vector / length };
         let m = (max - segment.p).abs().max((min - segment.p).abs()).max_element();
         let m2 = m * m;
         Self {
             segment,
+            direction,
+            length,
             rows: [AXES[x] - AXES[z] * (d[x] * scale_z), AXES[y] - AXES[z] * (d[y] * scale_z), AXES[z] * scale_z],
             edge_error: if usable { 128.0 * U * m2 } else { f64::INFINITY },
             t_error: 1024.0 * U * m2 * (m * scale_z.abs()).max(1.0),
@@ -124,6 +133,20 @@ impl SegmentTest {
     #[must_use]
     pub const fn segment(&self) -> &Segment {
         &self.segment
+    }
+
+    /// The segment's direction in units of its largest component; zero for a segment of length zero.
+    #[inline]
+    #[must_use]
+    pub const fn direction(&self) -> DVec3 {
+        self.direction
+    }
+
+    /// The size of the largest component of the segment's vector, in world units.
+    #[inline]
+    #[must_use]
+    pub const fn length(&self) -> f64 {
+        self.length
     }
 
     /// Exactly: do segment and triangle meet? If so, where (rounded)?
