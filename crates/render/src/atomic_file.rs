@@ -21,12 +21,15 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
         write(&mut out)?;
         return out.flush();
     }
-    let mut out = BufWriter::new(temporary_beside(path)?);
+    let temporary = temporary_beside(path)?;
+    // To the bare file: the temporary's own errors would show its name.
+    let mut out = BufWriter::new(temporary.as_file());
     write(&mut out)?;
-    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    out.flush()?;
+    drop(out);
     // Some file systems report a full disk only here.
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|error| error.error)?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path).map_err(|error| error.error)?;
     Ok(())
 }
 

@@ -22,7 +22,7 @@ const MOST_PIXELS: usize = 1 << 28;
 #[non_exhaustive]
 pub enum ImageError {
     /// The system refused to write.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
@@ -30,7 +30,7 @@ pub enum ImageError {
         source: io::Error,
     },
     /// The system refused to read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
