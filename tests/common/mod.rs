@@ -33,6 +33,7 @@ pub fn options() -> RenderOptions {
         seed: None,
         threads: Some(2),
         crop: None,
+        segment_first: true,
         max_voxels: 1 << 30,
     }
 }

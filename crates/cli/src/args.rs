@@ -47,6 +47,9 @@ pub(crate) struct RenderArgs {
     /// Samples on each path segment, for raymarch only [default: 7]
     #[arg(long, value_name = "N")]
     pub(crate) samples_per_segment: Option<u32>,
+    /// Cast a ray for every free flight instead of asking for a proof first (volpath); the image is the same
+    #[arg(long)]
+    pub(crate) no_segment_first: bool,
     /// Samples per pixel [default: the scene's]
     #[arg(long, value_name = "N")]
     pub(crate) spp: Option<u32>,

@@ -141,6 +141,20 @@ impl Media {
         }
     }
 
+    /// The way of a free flight to optical depth `tau` that starts in `medium`, if it ends in this medium before the segment does and meets
+    /// no boundary; found without a look at what lies beyond. `None` says nothing.
+    #[inline]
+    #[must_use]
+    pub fn short_flight(&self, segment: &Segment, medium: MediumId, tau: f64) -> Option<Segment> {
+        let t = tau / (self.medium(medium).sigma_t * segment.length());
+        // Not so for NaN: no extinction, no length.
+        if !(t < 1.0) {
+            return None;
+        }
+        let flight = Segment::new(segment.p, segment.at(t));
+        (self.crosses_nothing(&flight) || self.crossings(&flight).is_empty()).then_some(flight)
+    }
+
     #[inline]
     fn depth_of(&self, i: &Interval, length: f64) -> f64 {
         i.medium.map_or(0.0, |m| self.medium(m).sigma_t * ((i.t1 - i.t0) * length))

@@ -74,6 +74,7 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
         crop: options.crop.unwrap_or(scene.film.crop),
         spp: options.spp.unwrap_or(scene.sample_count),
         seed: options.seed.unwrap_or(scene.seed),
+        segment_first: options.segment_first,
     };
     let (pixels, counters) = match &acceleration {
         Acceleration::None(p) => job.run(p, progress),
@@ -107,6 +108,7 @@ struct Job<'a> {
     crop: PixelRect,
     spp: u32,
     seed: u64,
+    segment_first: bool,
 }
 
 impl Job<'_> {
@@ -153,7 +155,7 @@ impl Job<'_> {
     ) -> Result<(Vec<Rgb>, Counters), RenderError> {
         let integrator = Integrator {
             world: self.world,
-            visibility: Visibility::new(&self.world.bvh, proofs),
+            visibility: Visibility::new(&self.world.bvh, proofs, self.segment_first),
             settings: self.scene.integrator,
         };
         let mut counters = Counters::default();

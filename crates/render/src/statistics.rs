@@ -65,6 +65,14 @@ pub struct Statistics {
     pub p_accelerated_given_spatial: Option<f64>,
     /// The unknown fraction, 1 − proved / spatial.
     pub unknown_fraction: Option<f64>,
+    /// Rays cast for the first occluder.
+    pub rays: u64,
+    /// Free flights asked for a proof (segment-first).
+    pub flights: u64,
+    /// Free flights proved, each a ray saved.
+    pub flights_proved: u64,
+    /// flights proved / flights.
+    pub p_accelerated_flights: Option<f64>,
     /// For each emitter of the file, in its order: its neighbourhood, if it has one.
     pub neighbourhoods: Vec<Option<NeighbourhoodSize>>,
     /// Samples left out because they were not finite or negative; must be 0.
@@ -137,6 +145,10 @@ impl Statistics {
             p_spatial: ratio(r.counters.spatial, r.counters.queries),
             p_accelerated_given_spatial: ratio(r.counters.proved, r.counters.spatial),
             unknown_fraction: ratio(r.counters.spatial - r.counters.proved, r.counters.spatial),
+            rays: r.counters.rays,
+            flights: r.counters.flights,
+            flights_proved: r.counters.flights_proved,
+            p_accelerated_flights: ratio(r.counters.flights_proved, r.counters.flights),
             neighbourhoods: r
                 .build
                 .neighbourhoods
@@ -205,6 +217,16 @@ impl fmt::Display for Statistics {
             percent(self.p_accelerated_given_spatial),
             percent(self.unknown_fraction)
         )?;
+        write!(f, "\nrays           {} cast", self.rays)?;
+        if self.flights > 0 {
+            write!(
+                f,
+                ", {} saved by proof, {} of the {} free flights asked",
+                self.flights_proved,
+                percent(self.p_accelerated_flights),
+                self.flights
+            )?;
+        }
         if self.refused > 0 {
             write!(f, "\nWARNING        {} samples were not finite or negative and were left out", self.refused)?;
         }

@@ -105,6 +105,12 @@ pub struct Counters {
     pub spatial: u64,
     /// Those of the spatial ones that a proof answered.
     pub proved: u64,
+    /// Rays cast for the first occluder.
+    pub rays: u64,
+    /// Free flights that were asked for a proof: those that neither start nor end on an occluder.
+    pub flights: u64,
+    /// Those that were proved free, each a ray saved.
+    pub flights_proved: u64,
     /// Camera paths.
     pub paths: u64,
     /// Paths whose radiance was not finite or negative and was therefore left out. Must be 0.
@@ -116,6 +122,9 @@ impl std::ops::AddAssign for Counters {
         self.queries += other.queries;
         self.spatial += other.spatial;
         self.proved += other.proved;
+        self.rays += other.rays;
+        self.flights += other.flights;
+        self.flights_proved += other.flights_proved;
         self.paths += other.paths;
         self.refused += other.refused;
     }
@@ -126,20 +135,37 @@ impl std::ops::AddAssign for Counters {
 pub struct Visibility<'a, P> {
     bvh: &'a Bvh,
     proofs: &'a P,
+    segment_first: bool,
 }
 
 impl<'a, P: Proofs> Visibility<'a, P> {
-    /// Asks `proofs` first and `bvh` for the rest; both about the same occluders.
+    /// Asks `proofs` first and `bvh` for the rest; both about the same occluders. `segment_first` asks for proofs of free flights, too.
     #[must_use]
-    pub const fn new(bvh: &'a Bvh, proofs: &'a P) -> Self {
-        Self { bvh, proofs }
+    pub const fn new(bvh: &'a Bvh, proofs: &'a P, segment_first: bool) -> Self {
+        Self { bvh, proofs, segment_first }
     }
 
     /// The first occluder along the segment.
     #[inline]
     #[must_use]
-    pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
+    pub fn intersect(&self, segment: &Segment, counters: &mut Counters) -> Option<Hit> {
+        counters.rays += 1;
         self.bvh.intersect(segment)
+    }
+
+    /// The first occluder along a free flight; no ray is cast if there is a proof that there is none (Sec. 2.4 in \[Houska2013\]).
+    /// `spatial` says that it does not start on an occluder.
+    #[inline]
+    #[must_use]
+    pub fn intersect_flight(&self, flight: &Segment, spatial: bool, counters: &mut Counters) -> Option<Hit> {
+        if spatial && self.segment_first {
+            counters.flights += 1;
+            if self.proofs.answer_between(flight.p, flight.q) == Answer::Unoccluded {
+                counters.flights_proved += 1;
+                return None;
+            }
+        }
+        self.intersect(flight, counters)
     }
 
     /// Whether the closed segment of the query meets no occluder.

@@ -67,6 +67,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         seed: args.seed,
         threads: args.threads,
         crop: args.crop,
+        segment_first: !args.no_segment_first,
         ..RenderOptions::default()
     })
 }

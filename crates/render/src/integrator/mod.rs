@@ -49,6 +49,8 @@ struct Path {
     ray: PathRay,
     /// How its direction was drawn.
     origin: Origin,
+    /// Whether it starts on an occluder, where nothing can be proved.
+    on_surface: bool,
     /// Scattering events so far; passing a medium boundary is none.
     depth: u32,
     /// What light that arrives along the ray is worth at the camera.
@@ -59,7 +61,7 @@ struct Path {
 
 impl Path {
     const fn new(ray: PathRay) -> Self {
-        Self { ray, origin: Origin::Camera, depth: 0, throughput: Rgb::ONE, radiance: Rgb::ZERO }
+        Self { ray, origin: Origin::Camera, on_surface: false, depth: 0, throughput: Rgb::ONE, radiance: Rgb::ZERO }
     }
 }
 
@@ -87,8 +89,8 @@ impl<P: Proofs> Integrator<'_, P> {
 
     /// The first occluder on the ray, and the part of the ray before it.
     #[inline]
-    fn cast(&self, ray: &PathRay) -> (Option<Hit>, Segment) {
-        let hit = self.visibility.intersect(&ray.segment);
+    fn cast(&self, ray: &PathRay, counters: &mut Counters) -> (Option<Hit>, Segment) {
+        let hit = self.visibility.intersect(&ray.segment, counters);
         let free = match &hit {
             Some(hit) => Segment::new(ray.segment.p, ray.segment.at(hit.t)),
             None => ray.segment,
@@ -122,6 +124,7 @@ impl<P: Proofs> Integrator<'_, P> {
         let (direction, pdf) = sample_cosine_hemisphere(surface.normal, sampler.next_2d());
         path.throughput *= surface.reflectance;
         path.origin = Origin::Scattering { point: surface.point, pdf };
+        path.on_surface = true;
         path.ray = self.ray(surface.point, direction, medium);
         true
     }

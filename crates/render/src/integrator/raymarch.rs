@@ -20,7 +20,7 @@ impl<P: Proofs> Integrator<'_, P> {
     pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
-            let (hit, free) = self.cast(&path.ray);
+            let (hit, free) = self.cast(&path.ray, counters);
             let tau = self.world.media.optical_depth(&free, path.ray.medium);
             if tau > 0.0 && self.may_scatter(path.depth + 1) {
                 path.radiance += path.throughput * self.in_scattered(&free, &path.ray, tau, samples, sampler, counters);
