@@ -23,6 +23,7 @@ mod sampler;
 pub mod scene;
 mod sensor;
 mod statistics;
+pub mod verify;
 mod visibility;
 mod world;
 

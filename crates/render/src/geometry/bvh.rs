@@ -4,7 +4,7 @@
 //! so it never culls a triangle that the exact test would hit, and ties are broken by the triangle's number: no
 //! answer depends on the shape of the tree.
 
-use std::time::Duration;
+use std::{ops::ControlFlow, time::Duration};
 
 use glam::{DVec3, Vec3A};
 use obvhs::{
@@ -58,6 +58,22 @@ impl std::fmt::Debug for Bvh {
 /// three roundings of the slab test 3·2√3 + 3. That is below 32; twice as much is taken.
 const PAD: f64 = 64.0 / 16_777_216.0;
 
+/// Segments that start farther away than this, in multiples of the largest coordinate, are not traced in single precision.
+/// A point computed from the start is off by at most some 16·2⁻⁵³ times the start's distance: up to here by 2⁻²¹ of
+/// the largest coordinate, a small part of the half of [`PAD`] that its budget leaves over. (And it is never far beyond the grids'
+/// reach: an infinitely far emitter is sampled 10⁶ scenes away.)
+const FAR: f64 = 268_435_456.0;
+
+/// How a segment comes to the hierarchy.
+enum Approach {
+    /// It misses the padded bounds or has no length.
+    Miss,
+    /// The tree's ray, the distance of its start from the segment's, and the segment's length.
+    Ray(Ray, f64, f64),
+    /// From so far away that single precision does not do.
+    Far,
+}
+
 impl Bvh {
     /// Builds the hierarchy. Cost: O(n log n); about 1 µs a triangle.
     #[must_use]
@@ -100,9 +116,21 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
-        let (ray, start, length) = self.ray(segment)?;
-        let test = SegmentTest::new(*segment, self.min, self.max);
         let mut best: Option<Hit> = None;
+        let (ray, start, length) = match self.approach(segment) {
+            Approach::Miss => return None,
+            Approach::Ray(ray, start, length) => (ray, start, length),
+            Approach::Far => {
+                self.visit_hits_from_afar(segment, |hit| {
+                    if best.is_none_or(|b| (hit.t, hit.triangle) < (b.t, b.triangle)) {
+                        best = Some(hit);
+                    }
+                    ControlFlow::Continue(())
+                });
+                return best;
+            }
+        };
+        let test = SegmentTest::new(*segment, self.min, self.max);
         self.tree.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
                 let triangle = self.numbers[slot];
@@ -122,7 +150,18 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn occluded(&self, segment: &Segment) -> bool {
-        let Some((ray, _, _)) = self.ray(segment) else { return false };
+        let ray = match self.approach(segment) {
+            Approach::Miss => return false,
+            Approach::Ray(ray, _, _) => ray,
+            Approach::Far => {
+                let mut occluded = false;
+                self.visit_hits_from_afar(segment, |_| {
+                    occluded = true;
+                    ControlFlow::Break(())
+                });
+                return occluded;
+            }
+        };
         let test = SegmentTest::new(*segment, self.min, self.max);
         !self.tree.ray_traverse_miss(ray, |_, slot| {
             if test.intersect(&self.triangles[slot]).is_some() { f32::NEG_INFINITY } else { f32::INFINITY }
@@ -132,7 +171,16 @@ impl Bvh {
     /// Calls `visit` with every triangle that the closed segment meets, in no particular order.
     #[inline]
     pub fn visit_hits(&self, segment: &Segment, mut visit: impl FnMut(Hit)) {
-        let Some((ray, _, _)) = self.ray(segment) else { return };
+        let ray = match self.approach(segment) {
+            Approach::Miss => return,
+            Approach::Ray(ray, _, _) => ray,
+            Approach::Far => {
+                return self.visit_hits_from_afar(segment, |hit| {
+                    visit(hit);
+                    ControlFlow::Continue(())
+                });
+            }
+        };
         let test = SegmentTest::new(*segment, self.min, self.max);
         self.tree.ray_traverse_anyhit(ray, |_, slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
@@ -141,25 +189,27 @@ impl Bvh {
         });
     }
 
-    /// The tree's ray for a segment, the distance of its start from the segment's, and the segment's length;
-    /// `None` if the segment misses the padded bounds or has no length.
     #[inline]
-    fn ray(&self, segment: &Segment) -> Option<(Ray, f64, f64)> {
+    fn approach(&self, segment: &Segment) -> Approach {
         let d = segment.q - segment.p;
         let length = d.length();
         let direction = d / length;
         if !(length > 0.0 && direction.is_finite()) {
-            return None;
+            return Approach::Miss;
         }
         let (min, max) = (self.min - self.pad, self.max + self.pad);
         let mut start = 0.0;
         if !(segment.p.cmpge(min).all() && segment.p.cmple(max).all()) {
+            // The pad is in proportion to the largest coordinate.
+            if segment.p.abs().max_element() * PAD > FAR * self.pad {
+                return Approach::Far;
+            }
             let inv = direction.recip();
             let (t0, t1) = ((min - segment.p) * inv, (max - segment.p) * inv);
             // A direction parallel to a slab gives NaN on its border: `min` and `max` then keep the other operand.
             let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
             if near > far || near > length || far < 0.0 {
-                return None;
+                return Approach::Miss;
             }
             start = near.max(0.0);
         }
@@ -167,6 +217,55 @@ impl Bvh {
         #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
         let reach = ((length - start) * (1.0 + 1e-6) + self.pad) as f32;
         let ray = Ray::new(Vec3A::from(origin.as_vec3()), Vec3A::from(direction.as_vec3()), 0.0, reach);
-        Some((ray, start, length))
+        Approach::Ray(ray, start, length)
+    }
+
+    /// [`Bvh::visit_hits`] for segments of any reach, until `visit` breaks: boxes are tested in double precision, and widened by its
+    /// rounding errors.
+    ///
+    /// With u = 2⁻⁵³ and G the largest coordinate of the segment and of the triangles, computed points p + τ·(q − p), τ in [0, 1], are
+    /// within 8u·G of the true ones, and the bounds of τ for a slab carry three roundings, less than 8u·G in position. So boxes
+    /// widened by 64u·G lose nothing.
+    #[cold]
+    fn visit_hits_from_afar(&self, segment: &Segment, mut visit: impl FnMut(Hit) -> ControlFlow<()>) {
+        let Segment { p, q } = *segment;
+        let d = q - p;
+        let reach = p.abs().max(q.abs()).max(self.min.abs()).max(self.max.abs()).max_element();
+        let margin = 32.0 * f64::EPSILON * reach;
+        let meets = |min: DVec3, max: DVec3| {
+            let (low, high) = (min - margin - p, max + margin - p);
+            let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+            for axis in 0..3 {
+                if d[axis] == 0.0 {
+                    if low[axis] > 0.0 || high[axis] < 0.0 {
+                        return false;
+                    }
+                    continue;
+                }
+                let (t0, t1) = (low[axis] / d[axis], high[axis] / d[axis]);
+                enter = enter.max(t0.min(t1));
+                leave = leave.min(t0.max(t1));
+            }
+            enter <= leave
+        };
+        let test = SegmentTest::new(*segment, self.min, self.max);
+        let mut stack: Vec<usize> = if self.tree.nodes.is_empty() { vec![] } else { vec![0] };
+        while let Some(node) = stack.pop().and_then(|n| self.tree.nodes.get(n)) {
+            if !meets(node.aabb.min.as_dvec3(), node.aabb.max.as_dvec3()) {
+                continue;
+            }
+            let first = node.first_index as usize;
+            if !node.is_leaf() {
+                stack.extend([first, first + 1]);
+                continue;
+            }
+            for slot in first..first + node.prim_count as usize {
+                let Some(hit) = test.intersect(&self.triangles[slot]) else { continue };
+                let hit = Hit { triangle: self.numbers[slot], t: hit.t, barycentric: hit.barycentric };
+                if visit(hit).is_break() {
+                    return;
+                }
+            }
+        }
     }
 }
