@@ -38,10 +38,8 @@ fn exported_files() {
     {
         let read = |extension| String::from_utf8(sandbox.read(&format!("a/b/{name}.{extension}"))).unwrap();
         let (list, surface) = (read("txt"), read("obj"));
-        assert!(
-            list.starts_with(&format!("# {count} of 19320 voxels\n# resolution 20 19 43\n")) || count == 0,
-            "{list}"
-        );
+        let header: Vec<_> = list.lines().take(2).collect();
+        assert_eq!(header, [format!("# {count} of 16340 voxels").as_str(), "# resolution 20 19 43"], "{name}");
         assert!(list.contains("# origin -26 -16 -790\n# voxel size 32\n# linear index = a + b*X + c*X*Y\n"));
         assert_eq!(list.lines().filter(|l| !l.starts_with('#')).count(), count);
         assert!(count > 0 && lines(&surface, "v ").count() > 7 && lines(&surface, "f ").count() > 5, "{name}");

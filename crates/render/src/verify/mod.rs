@@ -231,24 +231,24 @@ struct Scratch {
 
 impl Run<'_> {
     fn all(&self, segments: u64, progress: &dyn Progress) -> Result<Sum, RenderError> {
-        let mut blocks = Vec::new();
-        for (n, class) in (0u64..).zip(SegmentClass::ALL) {
-            let [from, to] = [n, n + 1].map(|n| part(segments, n, CLASSES as u64));
-            blocks.extend((0..to - from).step_by(BLOCK as usize).map(|i| (class, i..(to - from).min(i + BLOCK))));
-        }
-        let none = || Sum::new(self.names.len());
-        blocks
+        let classes = CLASSES as u64;
+        // The largest share of a class, in blocks; classes take turns.
+        let blocks = segments.div_ceil(classes).div_ceil(BLOCK);
+        (0..blocks * classes)
             .into_par_iter()
-            .map_init(Scratch::default, |scratch, (class, indices)| {
+            .map_init(Scratch::default, |scratch, block| {
                 if progress.cancelled() {
                     return Err(RenderError::Cancelled);
                 }
+                let [class, block] = [block % classes, block / classes];
+                let share = part(segments, class + 1, classes) - part(segments, class, classes);
+                let indices = share.min(block * BLOCK)..share.min((block + 1) * BLOCK);
                 let n = indices.end - indices.start;
-                let sum = self.block(class, indices, scratch);
+                let sum = self.block(SegmentClass::ALL[class as usize], indices, scratch);
                 progress.work_done(n);
                 Ok(sum)
             })
-            .try_reduce(none, |a, b| Ok(a.plus(b)))
+            .try_reduce(|| Sum::new(self.names.len()), |a, b| Ok(a.plus(b)))
     }
 
     fn block(&self, class: SegmentClass, indices: std::ops::Range<u64>, scratch: &mut Scratch) -> Sum {
