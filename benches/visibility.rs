@@ -32,7 +32,7 @@ fn queries(world: &World, light: DVec3) -> Vec<ShadowQuery> {
 }
 
 fn bench_queries<P: Proofs>(c: &mut Criterion, name: &str, world: &World, proofs: &P, queries: &[ShadowQuery]) {
-    let visibility = Visibility::new(&world.bvh, proofs);
+    let visibility = Visibility::new(&world.bvh, proofs, false);
     let mut counters = Counters::default();
     for q in queries {
         assert_eq!(

@@ -16,8 +16,8 @@ pub struct Quiet;
 
 impl Progress for Quiet {
     fn phase(&self, _: &str) {}
-    fn pixels_total(&self, _: u64) {}
-    fn pixels_done(&self, _: u64) {}
+    fn work_total(&self, _: u64) {}
+    fn work_done(&self, _: u64) {}
     fn cancelled(&self) -> bool {
         false
     }

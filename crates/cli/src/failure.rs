@@ -17,6 +17,8 @@ pub(crate) enum Failure {
     Work(anyhow::Error),
     /// The user interrupted: exit code 130.
     Interrupted,
+    /// The same, after so many files were written whole.
+    InterruptedAfter(usize),
 }
 
 impl Failure {
@@ -37,6 +39,10 @@ impl Failure {
             }
             Self::Interrupted => {
                 say(format_args!("interrupted; nothing was written"));
+                ExitCode::from(130)
+            }
+            Self::InterruptedAfter(files) => {
+                say(format_args!("interrupted; {files} files were written"));
                 ExitCode::from(130)
             }
         }

@@ -30,6 +30,8 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
         Command::Render(a) => commands::render::run(a),
         Command::Scene(a) => commands::scene::run(&a.command),
+        Command::Verify(a) => commands::verify::run(a),
+        Command::Voxelize(a) => commands::voxelize::run(a),
         Command::Compare(a) => commands::compare::run(a),
     }
 }

@@ -1,4 +1,4 @@
-//! Telling how a render goes on, and Ctrl-C.
+//! Telling how a long work goes on, and Ctrl-C.
 
 use std::{
     io::{IsTerminal as _, stderr},
@@ -18,17 +18,23 @@ use crate::failure::{Failure, say};
 /// Progress on stderr: a bar on a terminal, else a line now and then, or nothing.
 pub(crate) struct Reporter {
     bar: Option<ProgressBar>,
-    lines: Option<Mutex<Instant>>,
+    lines: Option<Mutex<Lines>>,
     total: AtomicU64,
     done: AtomicU64,
     interrupted: Arc<AtomicBool>,
+}
+
+/// What the lines are about.
+struct Lines {
+    phase: String,
+    last: Instant,
 }
 
 /// Time between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 impl Reporter {
-    /// A reporter that also stops the render on Ctrl-C; a second Ctrl-C ends the program at once.
+    /// A reporter that also stops the work on Ctrl-C; a second Ctrl-C ends the program at once.
     pub(crate) fn new(quiet: bool) -> Result<Self, Failure> {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
@@ -47,7 +53,7 @@ impl Reporter {
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
-        let lines = (!quiet && !terminal).then(|| Mutex::new(Instant::now()));
+        let lines = (!quiet && !terminal).then(|| Mutex::new(Lines { phase: String::new(), last: Instant::now() }));
         Ok(Self { bar, lines, total: AtomicU64::new(0), done: AtomicU64::new(0), interrupted })
     }
 
@@ -70,27 +76,30 @@ impl Progress for Reporter {
             bar.set_message(name.to_owned());
             bar.tick();
         }
+        if let Some(mut lines) = self.lines.as_ref().and_then(|l| l.lock().ok()) {
+            name.clone_into(&mut lines.phase);
+        }
     }
 
-    fn pixels_total(&self, n: u64) {
+    fn work_total(&self, n: u64) {
         self.total.store(n, Ordering::Relaxed);
         if let Some(bar) = &self.bar {
             bar.set_length(n);
         }
     }
 
-    fn pixels_done(&self, n: u64) {
+    fn work_done(&self, n: u64) {
         let done = self.done.fetch_add(n, Ordering::Relaxed) + n;
         if let Some(bar) = &self.bar {
             bar.inc(n);
         }
-        // Called once a tile, so a lock does not matter; whoever does not get it has nothing new to say.
-        if let Some(mut last) = self.lines.as_ref().and_then(|l| l.try_lock().ok())
-            && last.elapsed() >= LINE_EVERY
+        // Called once a tile or block, so a lock does not matter; whoever does not get it has nothing new to say.
+        if let Some(mut lines) = self.lines.as_ref().and_then(|l| l.try_lock().ok())
+            && lines.last.elapsed() >= LINE_EVERY
         {
-            *last = Instant::now();
+            lines.last = Instant::now();
             let total = self.total.load(Ordering::Relaxed).max(1);
-            say(format_args!("rendering {} %", 100 * done / total));
+            say(format_args!("{} {} %", lines.phase, 100 * done / total));
         }
     }
 

@@ -90,6 +90,16 @@ impl Acceleration {
         };
         Ok((acceleration, report))
     }
+
+    /// For each emitter its safe neighbourhood; none at all with a method that builds none.
+    #[must_use]
+    pub fn neighbourhoods(&self) -> &[Option<SafeNeighbourhood>] {
+        match self {
+            Self::None(_) | Self::Ndf(_) | Self::Amr(_) => &[],
+            Self::NdfSn(p) => &p.neighbourhoods,
+            Self::AmrSn(p) => &p.neighbourhoods,
+        }
+    }
 }
 
 fn build_field<F: SafeZones>(grid: VoxelGrid, report: &mut BuildReport, build: impl FnOnce() -> F) -> FieldProofs<F> {

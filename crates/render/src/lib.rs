@@ -23,7 +23,9 @@ mod sampler;
 pub mod scene;
 mod sensor;
 mod statistics;
+pub mod verify;
 mod visibility;
+mod voxels;
 mod world;
 
 pub use acceleration::{Acceleration, BuildReport};
@@ -41,6 +43,7 @@ pub use render::{Rendering, render};
 pub use sampler::Sampler;
 pub use statistics::{NeighbourhoodSize, Statistics};
 pub use visibility::{Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, Proofs, ShadowQuery, Visibility};
+pub use voxels::SceneVoxels;
 pub use world::{SurfacePoint, World};
 
 /// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.

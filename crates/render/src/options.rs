@@ -1,5 +1,7 @@
 //! What a render can be asked for beyond the scene file, and how it reports while it runs.
 
+use glam::DVec3;
+
 use crate::{
     Method, RenderError,
     scene::{PixelRect, Scene},
@@ -66,21 +68,11 @@ impl RenderOptions {
     /// # Errors
     /// [`RenderError::Option`] names the option and what it has to be.
     pub fn validate(&self, scene: &Scene) -> Result<(), RenderError> {
-        let fail = |option: &'static str, message: String| Err(RenderError::Option { option, message });
         if self.spp == Some(0) {
             return fail("spp", "must be at least 1".into());
         }
-        if self.threads == Some(0) {
-            return fail("threads", "must be at least 1".into());
-        }
-        if self.threads.is_some_and(|n| n > MAX_THREADS) {
-            return fail("threads", format!("must be at most {MAX_THREADS}"));
-        }
-        if let Some(size) = self.voxel_size
-            && !(size.is_finite() && size > 0.0)
-        {
-            return fail("voxel", format!("must be a positive finite number, not {size}"));
-        }
+        check_threads(self.threads)?;
+        self.voxel_size.map_or(Ok(()), check_voxel_size)?;
         if self.integrator == (IntegratorKind::Raymarch { samples_per_segment: 0 }) {
             return fail("samples-per-segment", "must be at least 1".into());
         }
@@ -98,14 +90,51 @@ impl RenderOptions {
     }
 }
 
-/// Is told how a render goes on, from any thread, and may stop it.
+pub(crate) fn fail<T>(option: &'static str, message: String) -> Result<T, RenderError> {
+    Err(RenderError::Option { option, message })
+}
+
+pub(crate) fn check_voxel_size(size: f64) -> Result<(), RenderError> {
+    if !(size.is_finite() && size > 0.0) {
+        return fail("voxel", format!("must be a positive finite number, not {size}"));
+    }
+    Ok(())
+}
+
+fn check_threads(threads: Option<usize>) -> Result<(), RenderError> {
+    match threads {
+        Some(0) => fail("threads", "must be at least 1".into()),
+        Some(n) if n > MAX_THREADS => fail("threads", format!("must be at most {MAX_THREADS}")),
+        _ => Ok(()),
+    }
+}
+
+/// Runs `work` on a pool of that many threads, one for each processor by default.
+pub(crate) fn on_threads<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> Result<T, RenderError> + Send,
+) -> Result<T, RenderError> {
+    check_threads(threads)?;
+    // Rayon takes 0 for its default.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
+    pool.map_err(|e| RenderError::Threads { message: e.to_string() })?.install(work)
+}
+
+/// A 128th of the longest side of these bounds.
+pub(crate) fn default_voxel_size((min, max): (DVec3, DVec3)) -> f64 {
+    let extent = (max - min).max_element();
+    // A scene of one point has no extent; any size covers it with one voxel.
+    if extent > 0.0 { extent / 128.0 } else { 1.0 }
+}
+
+/// Is told how a long work goes on, from any thread, and may stop it.
 pub trait Progress: Sync {
-    /// A new phase of the render begins.
+    /// A new phase of the work begins, named by what is done or made in it.
     fn phase(&self, name: &str);
-    /// How many pixels there are to render.
-    fn pixels_total(&self, n: u64);
-    /// `n` more pixels are rendered.
-    fn pixels_done(&self, n: u64);
+    /// How much there is to do: pixels of a render, segments of a verification.
+    fn work_total(&self, n: u64);
+    /// `n` more of these are done.
+    fn work_done(&self, n: u64);
     /// Whether to stop; asked often, so it should be quick.
     fn cancelled(&self) -> bool;
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::{
     Acceleration, Image, IntegratorKind, Progress, RenderError, RenderOptions, Rgb, Sampler, Statistics, World,
     integrator::{Integrator, PathRay},
+    options::{default_voxel_size, on_threads},
     scene::{PixelRect, Scene},
     statistics::Record,
     visibility::{Counters, Proofs, Visibility},
@@ -36,12 +37,7 @@ pub struct Rendering {
 /// If an option or the voxel size is not usable, or `progress` asks to stop.
 pub fn render(scene: &Scene, options: &RenderOptions, progress: &dyn Progress) -> Result<Rendering, RenderError> {
     options.validate(scene)?;
-    let mut pool = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = options.threads {
-        pool = pool.num_threads(threads);
-    }
-    let pool = pool.build().map_err(|e| RenderError::Threads { message: e.to_string() })?;
-    pool.install(|| render_in_pool(scene, options, progress))
+    on_threads(options.threads, || render_in_pool(scene, options, progress))
 }
 
 fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progress) -> Result<Rendering, RenderError> {
@@ -51,11 +47,7 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
     let t_hierarchy = start.elapsed().as_secs_f64();
 
     progress.phase("distance field");
-    let voxel_size = options.voxel_size.unwrap_or_else(|| {
-        let extent = (world.bounds.1 - world.bounds.0).max_element();
-        // A scene of one point has no extent; any size covers it with one voxel.
-        if extent > 0.0 { extent / 128.0 } else { 1.0 }
-    });
+    let voxel_size = options.voxel_size.unwrap_or_else(|| default_voxel_size(world.bounds));
     let (acceleration, build) = Acceleration::build(
         options.method,
         &world.triangles,
@@ -119,7 +111,7 @@ impl Job<'_> {
     /// Renders all tiles; generic in the method, so that the dispatch stays out of the loops.
     fn run<P: Proofs>(&self, proofs: &P, progress: &dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
         let (width, height) = self.size();
-        progress.pixels_total(u64::from(width) * u64::from(height));
+        progress.work_total(u64::from(width) * u64::from(height));
         let tiles: Vec<PixelRect> = (self.crop.y0..self.crop.y1)
             .step_by(TILE as usize)
             .flat_map(|y0| (self.crop.x0..self.crop.x1).step_by(TILE as usize).map(move |x0| (x0, y0)))
@@ -129,7 +121,7 @@ impl Job<'_> {
             .par_iter()
             .map(|tile| {
                 let result = self.tile(proofs, *tile, progress)?;
-                progress.pixels_done(result.0.len() as u64);
+                progress.work_done(result.0.len() as u64);
                 Ok(result)
             })
             .collect::<Result<_, RenderError>>()?;

@@ -24,6 +24,9 @@ pub enum Answer {
 pub trait Proofs: Sync {
     /// What is known about the closed segment `from`–`to`, where `to` is a sampled point of emitter `emitter`.
     fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer;
+
+    /// What is known about the closed segment between any two points.
+    fn answer_between(&self, a: DVec3, b: DVec3) -> Answer;
 }
 
 /// The method `none`: every query goes to the hierarchy.
@@ -33,6 +36,11 @@ pub struct NoProofs;
 impl Proofs for NoProofs {
     #[inline]
     fn answer(&self, _: usize, _: DVec3, _: DVec3) -> Answer {
+        Answer::Unknown
+    }
+
+    #[inline]
+    fn answer_between(&self, _: DVec3, _: DVec3) -> Answer {
         Answer::Unknown
     }
 }
@@ -49,7 +57,12 @@ pub struct FieldProofs<F> {
 impl<F: SafeZones> Proofs for FieldProofs<F> {
     #[inline]
     fn answer(&self, _: usize, from: DVec3, to: DVec3) -> Answer {
-        let proved = match self.grid.voxel_span(from, to) {
+        self.answer_between(from, to)
+    }
+
+    #[inline]
+    fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
+        let proved = match self.grid.voxel_span(a, b) {
             Span::Inside(a, b) => self.field.proves(a, b),
             // The grid covers all occluders.
             Span::Outside => true,
@@ -78,8 +91,13 @@ impl<F: SafeZones> Proofs for NeighbourhoodProofs<F> {
                     Answer::Unknown
                 }
             }
-            _ => self.base.answer(emitter, from, to),
+            _ => self.base.answer_between(from, to),
         }
+    }
+
+    #[inline]
+    fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
+        self.base.answer_between(a, b)
     }
 }
 

@@ -12,6 +12,7 @@
 
 mod clip;
 mod error;
+mod export;
 mod grid;
 mod sat;
 mod set;
@@ -19,6 +20,7 @@ mod voxelize;
 
 pub use clip::Span;
 pub use error::VoxelError;
+pub use export::{write_indices, write_obj};
 pub use grid::{Resolution, Voxel, VoxelGrid};
 pub use set::VoxelSet;
 pub use voxelize::voxelize;

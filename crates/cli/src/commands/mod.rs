@@ -3,3 +3,5 @@
 pub(crate) mod compare;
 pub(crate) mod render;
 pub(crate) mod scene;
+pub(crate) mod verify;
+pub(crate) mod voxelize;

@@ -6,6 +6,7 @@ use std::{
 };
 
 use anyhow::{Context as _, anyhow};
+use serde::Serialize;
 use vdf_render::{
     AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, check_writable, render,
     scene::{DEFAULT_SCENE, LoadOptions, Scene, builtin, builtin_names},
@@ -20,7 +21,7 @@ use crate::{
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let options = options(args)?;
-    let (name, scene) = load(args)?;
+    let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
     options.validate(&scene)?;
     let output = output(args, &name)?;
     for warning in &scene.warnings {
@@ -73,11 +74,11 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
 }
 
 /// The scene and its name: a file if there is one of that path, else a built-in scene.
-fn load(args: &RenderArgs) -> Result<(String, Scene), Failure> {
-    let options = LoadOptions { defines: args.defines.clone() };
-    let path = args.scene.as_deref().unwrap_or(Path::new(DEFAULT_SCENE));
+pub(super) fn load(scene: Option<&Path>, defines: &[(String, String)]) -> Result<(String, Scene), Failure> {
+    let options = LoadOptions { defines: defines.to_vec() };
+    let path = scene.unwrap_or(Path::new(DEFAULT_SCENE));
     let known = path.to_str().and_then(builtin);
-    if let Some(source) = known.filter(|_| args.scene.is_none() || !path.exists()) {
+    if let Some(source) = known.filter(|_| scene.is_none() || !path.exists()) {
         return Ok((path.display().to_string(), Scene::from_source(&source, &options)?));
     }
     if !path.exists() {
@@ -120,18 +121,22 @@ fn is_same(a: &Path, b: &Path) -> bool {
 fn write_all(rendering: &Rendering, output: &Output, args: &RenderArgs, name: &str) -> Result<(), Failure> {
     let statistics = &rendering.statistics;
     if let Some(path) = &args.stats {
-        let json = serde_json::to_string_pretty(statistics)
-            .context("cannot express the statistics as JSON")
-            .map_err(Failure::Work)?;
-        write_atomically(path, |w| writeln!(w, "{json}"))
-            .with_context(|| format!("cannot write {}", path.display()))
-            .map_err(Failure::Work)?;
+        write_json(path, statistics)?;
     }
     write_png(&output.png, &rendering.image).map_err(RenderError::from)?;
     let attributes = attributes(statistics, name);
     let attributes: Vec<_> = attributes.iter().map(|(n, v)| (*n, v.clone())).collect();
     write_exr(&output.exr, &rendering.image, &attributes).map_err(RenderError::from)?;
     Ok(())
+}
+
+/// Writes the figures of a run for machines.
+pub(super) fn write_json(path: &Path, figures: &impl Serialize) -> Result<(), Failure> {
+    let json =
+        serde_json::to_string_pretty(figures).context("cannot express the figures as JSON").map_err(Failure::Work)?;
+    write_atomically(path, |w| writeln!(w, "{json}"))
+        .with_context(|| format!("cannot write {}", path.display()))
+        .map_err(Failure::Work)
 }
 
 /// What the EXR says of its making.

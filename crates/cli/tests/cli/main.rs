@@ -8,3 +8,5 @@ mod sandbox;
 mod scenes;
 #[cfg(target_os = "linux")]
 mod streams;
+mod verify;
+mod voxelize;

@@ -23,11 +23,20 @@ fn ticks(child: &Child) -> u64 {
 
 #[test]
 fn ctrl_c_stops_inside_a_tile() {
-    let sandbox = Sandbox::new();
     // One tile of minutes of work.
     let size = ["render", "-D", "width=16", "-D", "height=16", "--spp", "100000000", "--method", "none"];
-    let args = [&size[..], &["--stats", "fog.json"]].concat();
-    let mut child = sandbox.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    ctrl_c_stops(&[&size[..], &["--stats", "fog.json"]].concat());
+}
+
+#[test]
+fn ctrl_c_stops_a_verification() {
+    ctrl_c_stops(&["verify", "--segments", "1e12", "--voxel", "32", "--stats", "fog.json"]);
+}
+
+/// Interrupts the program after a while of work; it must end soon, with one message, and leave nothing behind.
+fn ctrl_c_stops(args: &[&str]) {
+    let sandbox = Sandbox::new();
+    let mut child = sandbox.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let deadline = Instant::now() + Duration::from_secs(60);
     while ticks(&child) < 30 && Instant::now() < deadline {
         thread::sleep(Duration::from_millis(10));
@@ -40,7 +49,7 @@ fn ctrl_c_stops_inside_a_tile() {
         }
         thread::sleep(Duration::from_millis(10));
     }
-    let outcome = Outcome::new(&args, &child.wait_with_output().unwrap());
+    let outcome = Outcome::new(args, &child.wait_with_output().unwrap());
     assert_eq!(outcome.code, Some(130), "{}", outcome.stderr);
     assert_eq!((outcome.stdout.as_str(), outcome.stderr.as_str()), ("", "interrupted; nothing was written\n"));
     assert!(sandbox.files().is_empty(), "{:?}", sandbox.files());
@@ -53,13 +62,15 @@ fn statistics_to_a_full_device() {
 }
 
 /// The commands that write to stdout.
-fn talkers() -> [(Sandbox, Vec<&'static str>); 4] {
+fn talkers() -> [(Sandbox, Vec<&'static str>); 6] {
     let compare = Sandbox::new();
     compare.render(&["-o", "a.exr"]);
     [
         (Sandbox::new(), [&["render"], &TINY[..]].concat()),
         (Sandbox::new(), vec!["scene", "list"]),
         (Sandbox::new(), vec!["scene", "write", "cbox_vol2"]),
+        (Sandbox::new(), vec!["verify", "--segments", "1000", "--voxel", "32"]),
+        (Sandbox::new(), vec!["voxelize", "--voxel", "32"]),
         (compare, vec!["compare", "a.exr", "a.exr"]),
     ]
 }

@@ -71,6 +71,21 @@ const SPEED: f64 = 1.0 / 4096.0;
 /// The smallest component of a direction, 2⁻²³ of the largest; keeps reciprocals finite.
 const SMALLEST_COMPONENT: f32 = (SPEED * f32::EPSILON as f64) as f32;
 
+/// Segments that start farther away than this, in multiples of the largest coordinate, are not traced in single precision.
+/// A point computed from the start is off by at most some 16·2⁻⁵³ times the start's distance: up to here by 2⁻²¹ of the
+/// largest coordinate, a small part of the half of [`PAD`] that its budget leaves over.
+const FAR: f64 = 268_435_456.0;
+
+/// How a segment comes to the hierarchy.
+enum Approach {
+    /// It misses the padded bounds or has no length.
+    Miss,
+    /// The tree's ray, and where it starts: the distance from the segment's start along its largest component, in world units.
+    Ray(Ray, f64),
+    /// From so far away that single precision does not do; no tree is worth the trouble, all triangles are tested.
+    Far,
+}
+
 impl Bvh {
     /// Builds the hierarchy. Cost: O(n log n); about 1 µs a triangle.
     #[must_use]
@@ -113,8 +128,14 @@ impl Bvh {
     #[must_use]
     pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
         let test = SegmentTest::new(*segment, self.min, self.max);
-        let (ray, start) = self.ray(&test)?;
         let mut best: Option<Hit> = None;
+        let (ray, start) = match self.approach(&test) {
+            Approach::Miss => return None,
+            Approach::Ray(ray, start) => (ray, start),
+            Approach::Far => {
+                return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
+            }
+        };
         self.tree.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
                 let triangle = self.numbers[slot];
@@ -134,7 +155,11 @@ impl Bvh {
     #[must_use]
     pub fn occluded(&self, segment: &Segment) -> bool {
         let test = SegmentTest::new(*segment, self.min, self.max);
-        let Some((ray, _)) = self.ray(&test) else { return false };
+        let ray = match self.approach(&test) {
+            Approach::Miss => return false,
+            Approach::Ray(ray, _) => ray,
+            Approach::Far => return self.all_hits(&test).next().is_some(),
+        };
         !self.tree.ray_traverse_miss(ray, |_, slot| {
             if test.intersect(&self.triangles[slot]).is_some() { f32::NEG_INFINITY } else { f32::INFINITY }
         })
@@ -144,7 +169,11 @@ impl Bvh {
     #[inline]
     pub fn visit_hits(&self, segment: &Segment, mut visit: impl FnMut(Hit)) {
         let test = SegmentTest::new(*segment, self.min, self.max);
-        let Some((ray, _)) = self.ray(&test) else { return };
+        let ray = match self.approach(&test) {
+            Approach::Miss => return,
+            Approach::Ray(ray, _) => ray,
+            Approach::Far => return self.all_hits(&test).for_each(visit),
+        };
         self.tree.ray_traverse_anyhit(ray, |_, slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
                 visit(Hit { triangle: self.numbers[slot], t: hit.t, barycentric: hit.barycentric });
@@ -152,25 +181,36 @@ impl Bvh {
         });
     }
 
-    /// The tree's ray for a segment, and where it starts: the distance from the segment's start along its largest component; `None`
-    /// if the segment misses the padded bounds or has no length.
+    /// All hits of a segment, without the tree.
+    #[cold]
+    fn all_hits<'a>(&'a self, test: &'a SegmentTest) -> impl Iterator<Item = Hit> + 'a {
+        let slots = self.triangles.iter().zip(&self.numbers);
+        slots.filter_map(|(triangle, &number)| {
+            test.intersect(triangle).map(|hit| Hit { triangle: number, t: hit.t, barycentric: hit.barycentric })
+        })
+    }
+
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-    fn ray(&self, test: &SegmentTest) -> Option<(Ray, f64)> {
+    fn approach(&self, test: &SegmentTest) -> Approach {
         let direction = test.direction();
         if !(test.length() > 0.0 && direction.is_finite()) {
-            return None;
+            return Approach::Miss;
         }
         let (min, max) = (self.min - self.pad, self.max + self.pad);
         let mut start = 0.0;
         let mut origin = test.segment().p;
         if !(origin.cmpge(min).all() && origin.cmple(max).all()) {
+            // The pad is in proportion to the largest coordinate.
+            if origin.abs().max_element() * PAD > FAR * self.pad {
+                return Approach::Far;
+            }
             let inv = direction.recip();
             let (t0, t1) = ((min - origin) * inv, (max - origin) * inv);
             // A direction parallel to a slab gives NaN on its border: `min` and `max` then keep the other operand.
             let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
             if near > far || near > test.length() || far < 0.0 {
-                return None;
+                return Approach::Miss;
             }
             start = near.max(0.0);
             origin += direction * start;
@@ -185,7 +225,7 @@ impl Bvh {
             tmin: 0.0,
             tmax: self.ray_parameter(test.length() - start),
         };
-        Some((ray, start))
+        Approach::Ray(ray, start)
     }
 
     /// The parameter of a tree's ray at this distance from its start (measured along the largest component), rounded up by more than the

@@ -1,0 +1,73 @@
+//! What is true of a segment: the loop over all triangles, and the hierarchy.
+
+use glam::DVec3;
+
+use crate::{
+    Triangle, World,
+    geometry::{Segment, intersect_exact},
+};
+
+/// The loop is run on every segment up to this many triangles; beyond, on a share of the segments such that it costs no more.
+const TRIANGLES_PER_SEGMENT: u64 = 256;
+
+/// Of the segments without a proof only one in so many is asked about: they test the hierarchy, not the proofs.
+const UNPROVED: u64 = 16;
+
+/// The two references for one scene.
+#[derive(Debug)]
+pub(super) struct Oracle<'a> {
+    world: &'a World,
+    /// Bounds of each triangle.
+    bounds: Vec<(DVec3, DVec3)>,
+    /// The loop is run on one segment in so many.
+    every: u64,
+}
+
+/// Whether an occluder meets a segment; `None` where this reference was not asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Truth {
+    pub(super) by_hierarchy: Option<bool>,
+    pub(super) by_loop: Option<bool>,
+}
+
+impl Truth {
+    /// True if at least one reference says so. Where they disagree, a proof is wrong whatever it says.
+    pub(super) fn says(&self, occluded: bool) -> bool {
+        self.by_hierarchy == Some(occluded) || self.by_loop == Some(occluded)
+    }
+
+    pub(super) fn disagrees(&self) -> bool {
+        matches!((self.by_hierarchy, self.by_loop), (Some(a), Some(b)) if a != b)
+    }
+}
+
+impl<'a> Oracle<'a> {
+    pub(super) fn new(world: &'a World) -> Self {
+        let bounds = |t: &Triangle| {
+            let [a, b, c] = t.vertices_f64();
+            (a.min(b).min(c), a.max(b).max(c))
+        };
+        Self {
+            world,
+            bounds: world.triangles.iter().map(bounds).collect(),
+            every: (world.triangles.len() as u64).div_ceil(TRIANGLES_PER_SEGMENT).max(1),
+        }
+    }
+
+    /// Asks about segment `index`, which a method has `proved` something of, or none.
+    pub(super) fn ask(&self, segment: &Segment, index: u64, proved: bool) -> Truth {
+        let every = if proved { self.every } else { UNPROVED.max(self.every) };
+        let by_loop = index.is_multiple_of(every).then(|| self.occluded_by_any(segment));
+        let by_hierarchy = (proved || by_loop.is_some()).then(|| self.world.bvh.occluded(segment));
+        Truth { by_hierarchy, by_loop }
+    }
+
+    /// The slow twin of [`crate::geometry::Bvh::occluded`]: exact predicates on every triangle. Only those are skipped
+    /// whose bounds and the segment's are apart on an axis, which is a comparison of exact numbers.
+    fn occluded_by_any(&self, segment: &Segment) -> bool {
+        let (min, max) = (segment.p.min(segment.q), segment.p.max(segment.q));
+        let apart = |(low, high): &(DVec3, DVec3)| high.cmplt(min).any() || low.cmpgt(max).any();
+        let all = self.bounds.iter().zip(&self.world.triangles);
+        all.filter(|(bounds, _)| !apart(bounds)).any(|(_, t)| intersect_exact(segment, t).is_some())
+    }
+}

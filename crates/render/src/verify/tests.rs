@@ -1,0 +1,233 @@
+//! Liars must be caught, and what is asked must not depend on threads.
+
+use glam::{DMat4, DVec3, Vec3};
+
+use super::*;
+use crate::{
+    NoProofs, Rgb, Triangle,
+    scene::{
+        Bsdf, Emitter, FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect, ReconstructionFilter, Surface,
+    },
+};
+
+/// A wall across the unit cube, which is as bright as day on both sides.
+fn scene() -> Scene {
+    let v = |y: f32, z: f32| Vec3::new(0.5, y, z);
+    let white = Rgb::ONE;
+    Scene {
+        surfaces: vec![Surface {
+            triangles: vec![
+                Triangle::new(v(0.0, 0.0), v(1.0, 0.0), v(1.0, 1.0)),
+                Triangle::new(v(0.0, 0.0), v(1.0, 1.0), v(0.0, 1.0)),
+            ],
+            bsdf: Bsdf { front: white, back: white },
+            radiance: None,
+        }],
+        boundaries: vec![],
+        media: vec![],
+        emitters: [0.0, 1.0].map(|x| Emitter::Point { position: DVec3::splat(x), intensity: white }).to_vec(),
+        sensor: PerspectiveSensor {
+            world_from_camera: DMat4::IDENTITY,
+            tan_half_fov_x: 1.0,
+            near_clip: 0.1,
+            far_clip: 10.0,
+            medium: None,
+        },
+        film: FilmSettings {
+            width: 1,
+            height: 1,
+            crop: PixelRect { x0: 0, y0: 0, x1: 1, y1: 1 },
+            filter: ReconstructionFilter::Box,
+        },
+        integrator: IntegratorSettings { max_depth: None, rr_depth: 5 },
+        sample_count: 1,
+        seed: 0,
+        warnings: vec![],
+    }
+}
+
+struct Quiet(bool);
+
+impl Progress for Quiet {
+    fn phase(&self, _: &str) {}
+    fn work_total(&self, _: u64) {}
+    fn work_done(&self, _: u64) {}
+    fn cancelled(&self) -> bool {
+        self.0
+    }
+}
+
+/// Always says the same, or the truth but for queries towards emitter 1.
+enum Liar {
+    Always(Answer),
+    AboutEmitter1(World),
+}
+
+impl Proofs for Liar {
+    fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+        match self {
+            Self::AboutEmitter1(_) if emitter == 1 => Answer::Unoccluded,
+            _ => self.answer_between(from, to),
+        }
+    }
+
+    fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
+        match self {
+            Self::Always(answer) => *answer,
+            Self::AboutEmitter1(w) if w.bvh.occluded(&crate::geometry::Segment::new(a, b)) => Answer::Occluded,
+            Self::AboutEmitter1(_) => Answer::Unoccluded,
+        }
+    }
+}
+
+fn asked(proofs: &Liar, segments: u64) -> Sum {
+    let scene = scene();
+    let world = World::new(&scene);
+    let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, 0.125, 1 << 20).unwrap();
+    let run = Run {
+        claimants: vec![&NoProofs, proofs],
+        names: &["none", "liar"],
+        generator: Generator::new(&scene, &world, grid, 3, 0),
+        oracle: &Oracle::new(&world),
+        voxel_size: 0.125,
+    };
+    run.all(segments, &Quiet(false)).unwrap()
+}
+
+#[test]
+fn a_liar_is_caught_in_every_class() {
+    for answer in [Answer::Unoccluded, Answer::Occluded] {
+        let sum = asked(&Liar::Always(answer), 20_000);
+        for (class, t) in SegmentClass::ALL.iter().zip(&sum.classes) {
+            assert_eq!((t.segments, t.proved, t.proofs), (2000, 2000, 2000), "{class:?}");
+            assert!(t.wrong > 0 && t.wrong < t.proofs, "{class:?}: {t:?}");
+            assert_eq!(t.bound(), None);
+        }
+        let wrong: u64 = sum.classes.iter().map(|t| t.wrong).sum();
+        assert_eq!(sum.methods, [[0, 0], [20_000, wrong]]);
+        assert_eq!(sum.checks.proved_by_hierarchy, 20_000);
+        assert_eq!(sum.checks.proved_by_loop, 20_000);
+        assert_eq!(sum.failures.len(), TOLD);
+        assert!(sum.failures.iter().all(|f| f.methods == ["liar"]));
+    }
+}
+
+#[test]
+fn a_wrong_answer_for_an_emitter_is_not_hidden_by_a_right_one_for_the_points() {
+    let scene = scene();
+    let sum = asked(&Liar::AboutEmitter1(World::new(&scene)), 20_000);
+    assert!(sum.methods[1][1] > 500, "{:?}", sum.methods);
+    assert!(sum.failures.iter().all(|f| f.emitter == Some(1) && f.to == [1.0; 3]));
+}
+
+#[test]
+fn silence_is_no_proof() {
+    let sum = asked(&Liar::Always(Answer::Unknown), 20_000);
+    assert!(sum.classes.iter().all(|t| t.proved == 0 && t.proofs == 0 && t.bound().is_none()));
+    assert!(sum.failures.is_empty() && sum.checks.disagreements == 0);
+    // One in sixteen is compared all the same.
+    assert_eq!(sum.checks.compared, 10 * 2000 / 16);
+}
+
+#[test]
+fn a_failure_can_be_repeated_from_its_text() {
+    let failure = Failure {
+        methods: vec!["ndf"],
+        voxel_size: 0.1,
+        class: SegmentClass::Axis,
+        index: 7,
+        emitter: Some(0),
+        from: [-0.0, 0.1_f64.next_up(), 1e300],
+        to: [1.0; 3],
+        occluded_by_hierarchy: Some(true),
+        occluded_by_loop: None,
+    };
+    assert_eq!(
+        failure.to_string(),
+        "ndf: voxel 0.1, axis 7, to emitter 0: from [-0.0, 0.10000000000000002, 1e300] to [1.0, 1.0, 1.0]; \
+         hierarchy: occluded, loop: not asked"
+    );
+}
+
+#[test]
+fn the_report_does_not_depend_on_threads() {
+    let report = |threads| {
+        let voxel_sizes = vec![0.125, 0.1];
+        let options = VerifyOptions { voxel_sizes, segments: 50_001, threads: Some(threads), ..Default::default() };
+        let report = verify(&scene(), &options, &Quiet(false)).unwrap();
+        VerifyReport { seconds: 0.0, threads: 0, ..report }
+    };
+    let one = report(1);
+    assert_eq!(one, report(3));
+    assert!(one.is_sound(), "{one}");
+    assert_eq!((one.total.segments, one.grids.len()), (50_001, 2));
+    assert!(one.classes.iter().all(|c| c.tally.segments.abs_diff(5000) <= 2), "{one}");
+    assert!(one.methods.iter().all(|m| m.proofs > 5000), "{one}");
+    assert_eq!(one.total.bound(), Some(3.0 / one.total.proved as f64));
+}
+
+#[test]
+fn a_share_of_the_proofs_goes_through_the_loop_if_triangles_are_many() {
+    let mut scene = scene();
+    let wall = scene.surfaces[0].triangles.clone();
+    scene.surfaces[0].triangles = wall.repeat(500);
+    let options = VerifyOptions { segments: 100_000, ..Default::default() };
+    let report = verify(&scene, &options, &Quiet(false)).unwrap();
+    assert_eq!(report.checks.proved_by_hierarchy, report.total.proved);
+    // 1000 triangles: one in ceil(1000/256).
+    let share = report.checks.proved_by_loop as f64 / report.total.proved as f64;
+    assert!((0.2..0.3).contains(&share), "{share}");
+    assert!(report.is_sound(), "{report}");
+}
+
+#[test]
+fn bad_options_and_a_wish_to_stop_are_errors() {
+    let with = |change: fn(&mut VerifyOptions)| {
+        let mut options = VerifyOptions { segments: 1000, ..Default::default() };
+        change(&mut options);
+        verify(&scene(), &options, &Quiet(false)).map(drop)
+    };
+    let option = |r: Result<(), RenderError>| match r {
+        Err(RenderError::Option { option, .. }) => option,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(option(with(|o| o.segments = 0)), "segments");
+    assert_eq!(option(with(|o| o.methods.clear())), "method");
+    assert_eq!(option(with(|o| o.methods.push(Method::None))), "method");
+    assert_eq!(option(with(|o| o.threads = Some(0))), "threads");
+    assert_eq!(option(with(|o| o.voxel_sizes = vec![0.1, -1.0])), "voxel");
+    assert!(matches!(with(|o| o.voxel_sizes = vec![1e-9]), Err(RenderError::Voxel(_))));
+    let options = VerifyOptions::default();
+    assert!(matches!(verify(&scene(), &options, &Quiet(true)), Err(RenderError::Cancelled)));
+}
+
+/// Every class must reach the cases that it is for: this counts them.
+#[test]
+fn classes_are_what_they_say() {
+    let scene = scene();
+    let world = World::new(&scene);
+    let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, 0.125, 1 << 20).unwrap();
+    let generator = Generator::new(&scene, &world, grid, 0, 0);
+    let count =
+        |class, wanted: &dyn Fn(&Query) -> bool| (0..2000).filter(|&i| wanted(&generator.query(class, i))).count();
+    let inside = |p: DVec3| grid.voxel_containing(p).is_some();
+    let whole = |x: f64| (x * 8.0).fract() == 0.0;
+    assert_eq!(count(SegmentClass::Random, &|q| q.emitter.is_none() && inside(q.segment.p)), 2000);
+    assert_eq!(count(SegmentClass::Light, &|q| q.emitter.is_some()), 2000);
+    for class in SegmentClass::ALL.into_iter().skip(2) {
+        let ends_in_light = |q: &Query| q.emitter.is_some_and(|e| q.segment.q == DVec3::splat(e as f64));
+        assert!(count(class, &ends_in_light) > 200, "{class:?}");
+        assert_eq!(count(class, &|q| q.emitter.is_some() && !ends_in_light(q)), 0, "{class:?}");
+    }
+    assert!(count(SegmentClass::Surface, &|q| q.segment.p.x == 0.5) > 300);
+    assert!(count(SegmentClass::Lattice, &|q| q.segment.p.to_array().into_iter().all(whole)) > 100);
+    let in_one_face = |q: &Query| (0..3).any(|k| q.segment.p[k] == q.segment.q[k] && whole(q.segment.p[k]));
+    assert!(count(SegmentClass::Lattice, &in_one_face) > 200);
+    let zero_of = |sign: bool| {
+        move |q: &Query| (0..3).any(|k| q.segment.p[k] == 0.0 && q.segment.p[k].is_sign_negative() == sign)
+    };
+    assert!(count(SegmentClass::Axis, &zero_of(true)) > 50 && count(SegmentClass::Axis, &zero_of(false)) > 50);
+    assert!(count(SegmentClass::Short, &|q| q.segment.length() == 0.0) > 200);
+    assert!(count(SegmentClass::Outside, &|q| !inside(q.segment.p)) > 800);
+    assert!(count(SegmentClass::Outside, &|q| q.segment.p.abs().max_element() > 1e11) > 200);
+}
