@@ -10,7 +10,7 @@ use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 use vdf::{
     render::{
-        Acceleration, Answer, Proofs, Sampler, Triangle, World,
+        Acceleration, Answer, Proofs, ProofsVisitor, Sampler, Triangle, World,
         geometry::{Segment, intersect_exact},
         scene::{Emitter, Scene},
     },
@@ -119,19 +119,18 @@ fn count() -> u32 {
 }
 
 /// Asks the method about each segment; returns proofs made and proofs wrong.
-fn check(
-    acceleration: &Acceleration,
-    generator: &Generator,
-    emitters: &[Emitter],
+struct Check<'a> {
+    generator: &'a Generator<'a>,
+    emitters: &'a [Emitter],
     segments: u32,
     seed: u64,
-) -> (u64, u64) {
-    match acceleration {
-        Acceleration::None(p) => check_proofs(p, generator, emitters, segments, seed),
-        Acceleration::Ndf(p) => check_proofs(p, generator, emitters, segments, seed),
-        Acceleration::Amr(p) => check_proofs(p, generator, emitters, segments, seed),
-        Acceleration::NdfSn(p) => check_proofs(p, generator, emitters, segments, seed),
-        Acceleration::AmrSn(p) => check_proofs(p, generator, emitters, segments, seed),
+}
+
+impl ProofsVisitor for Check<'_> {
+    type Output = (u64, u64);
+
+    fn visit<P: Proofs>(self, proofs: &P) -> (u64, u64) {
+        check_proofs(proofs, self.generator, self.emitters, self.segments, self.seed)
     }
 }
 
@@ -190,7 +189,8 @@ fn no_proof_is_wrong() {
                     .expect("a sound grid");
             let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, size, 1 << 30).expect("a sound grid");
             let generator = Generator { world: &world, lights: lights.clone(), grid };
-            let (made, wrong) = check(&acceleration, &generator, &scene.emitters, share, k as u64);
+            let check = Check { generator: &generator, emitters: &scene.emitters, segments: share, seed: k as u64 };
+            let (made, wrong) = acceleration.accept(check);
             assert_eq!(wrong, 0, "{name}, {method}, voxel {size}: {wrong} of {made} proofs are wrong");
             proofs += made;
             asked += u64::from(share);
