@@ -62,6 +62,11 @@ fn bench(c: &mut Criterion) {
         group.bench_with_input(BenchmarkId::new("xsn", n), &occupied, |b, set| {
             b.iter(|| ExtendedNeighbourhood::new(black_box(set), light.into()));
         });
+        // Nothing in the way is the slowest case: all rows are looked at from end to end.
+        let empty = VoxelSet::new(occupied.resolution());
+        group.bench_with_input(BenchmarkId::new("xsn, empty grid", n), &empty, |b, set| {
+            b.iter(|| ExtendedNeighbourhood::new(black_box(set), light.into()));
+        });
         group.finish();
     }
 }

@@ -28,7 +28,11 @@
 
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
-use crate::{FieldError, SafeZones, manhattan, manhattan_distance, rows::Ways, validate};
+use crate::{
+    FieldError, SafeZones, manhattan, manhattan_distance,
+    rows::Ways,
+    validate::{self, FACE_STEPS},
+};
 
 /// The names of the six distances, in the order of the faces' numbers.
 const NAMES: [&str; 6] = ["dsz x+", "dsz x-", "dsz y+", "dsz y-", "dsz z+", "dsz z-"];
@@ -47,9 +51,12 @@ impl Dsz {
     pub fn build(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
         let mut distances = vec![0; 6 * resolution.voxel_count()];
-        for (plane, face) in distances.chunks_exact_mut(resolution.voxel_count()).zip(0..) {
-            let mut ways = [Ways::Both; 3];
-            ways[face / 2] = if face % 2 == 0 { Ways::Plus } else { Ways::Minus };
+        for (plane, step) in distances.chunks_exact_mut(resolution.voxel_count()).zip(FACE_STEPS) {
+            let ways = step.map(|s| match s {
+                0 => Ways::Both,
+                1.. => Ways::Plus,
+                _ => Ways::Minus,
+            });
             manhattan::distances(occupied, ways, plane);
         }
         Self { resolution, distances }
@@ -68,9 +75,7 @@ impl Dsz {
     /// [`Dsz::half_space_distance`]. The voxel must be one of the grid's; here it does not matter whether it is occupied.
     #[must_use]
     pub fn distance(&self, face: usize, voxel: Voxel) -> u16 {
-        let mut step = [0; 3];
-        step[face / 2] = if face % 2 == 0 { 1 } else { -1 };
-        let beyond = validate::neighbour(self.resolution, voxel, step);
+        let beyond = validate::neighbour(self.resolution, voxel, FACE_STEPS[face]);
         1 + beyond.map_or(u16::from(u8::MAX), |next| self.half_space_distance(face, next).into())
     }
 
@@ -119,9 +124,8 @@ impl SafeZones for Dsz {
             validate::zero_where_occupied(occupied, name, plane(face))?;
         }
         for (face, name) in NAMES.into_iter().enumerate() {
-            let mut back = [0; 3];
-            back[face / 2] = if face % 2 == 0 { -1 } else { 1 };
-            let steps: Vec<_> = validate::FACE_STEPS.into_iter().filter(|&step| step != back).collect();
+            let back = FACE_STEPS[face ^ 1];
+            let steps: Vec<_> = FACE_STEPS.into_iter().filter(|&step| step != back).collect();
             validate::recurrence(occupied, name, &steps, plane(face))?;
         }
         Ok(())

@@ -34,7 +34,7 @@ use crate::{
     manhattan::{self, columns},
     manhattan_distance,
     rows::{FAR, Ways},
-    validate,
+    validate::{self, FACE_STEPS},
 };
 
 /// The names of the six extents, in the order of the directions' numbers.
@@ -118,8 +118,7 @@ impl Dual {
 
     /// What D must be, from its values in voxels ahead: one step and, where Dist rises, at the end of the next one's walk.
     fn expected_extent(&self, direction: usize, voxel: Voxel) -> u8 {
-        let mut step = [0; 3];
-        step[direction / 2] = if direction % 2 == 0 { 1 } else { -1 };
+        let step = FACE_STEPS[direction];
         let ahead = |voxel, n: u8| validate::neighbour(self.resolution, voxel, step.map(|s| s * (i64::from(n) + 1)));
         let here = self.distance(voxel);
         let Some(next) = ahead(voxel, 0).filter(|&next| here > 0 && self.distance(next) >= here) else { return 0 };
@@ -128,8 +127,8 @@ impl Dual {
             return walk.saturating_add(1);
         }
         match ahead(next, walk) {
-            Some(end) if walk < FAR => walk.saturating_add(2).saturating_add(self.extent(direction, end)),
-            _ => walk.saturating_add(1),
+            Some(end) => walk.saturating_add(2).saturating_add(self.extent(direction, end)),
+            None => walk.saturating_add(1),
         }
     }
 }
@@ -152,7 +151,7 @@ impl SafeZones for Dual {
     fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
         validate::same_resolution(self.resolution, occupied)?;
         validate::zero_where_occupied(occupied, "dual", |voxel| self.distance(voxel))?;
-        validate::recurrence(occupied, "dual", &validate::FACE_STEPS, |voxel| self.distance(voxel))?;
+        validate::recurrence(occupied, "dual", &FACE_STEPS, |voxel| self.distance(voxel))?;
         NAMES.into_iter().enumerate().try_for_each(|(direction, name)| {
             validate::values(
                 self.resolution,

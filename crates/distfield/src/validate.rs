@@ -17,7 +17,7 @@ use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 use crate::{FieldError, rows::FAR};
 
-/// The steps across the six faces of a voxel.
+/// The steps across the six faces of a voxel, in the order of the faces' numbers; face ^ 1 is opposite.
 pub(crate) const FACE_STEPS: [[i64; 3]; 6] = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
 
 /// Those of the 26 steps to all neighbours that `admits` holds of.

@@ -142,7 +142,7 @@ impl Definitions {
 
 /// The sign of a direction or face.
 fn sign(direction: usize) -> i64 {
-    if direction % 2 == 0 { 1 } else { -1 }
+    if direction.is_multiple_of(2) { 1 } else { -1 }
 }
 
 fn moved(resolution: Resolution, v: Voxel, direction: usize, n: i64) -> Option<Voxel> {
