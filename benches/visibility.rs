@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec3, dvec3};
 use vdf::render::{
-    Acceleration, Counters, Method, Proofs, Sampler, ShadowQuery, Visibility, World,
+    Acceleration, Counters, Method, Proofs, ProofsVisitor, Sampler, ShadowQuery, Visibility, World,
     geometry::Segment,
     scene::{Emitter, LoadOptions, Scene, builtin},
 };
@@ -52,6 +52,21 @@ fn bench_queries<P: Proofs>(c: &mut Criterion, name: &str, world: &World, proofs
     group.finish();
 }
 
+struct BenchQueries<'a> {
+    c: &'a mut Criterion,
+    name: &'a str,
+    world: &'a World,
+    queries: &'a [ShadowQuery],
+}
+
+impl ProofsVisitor for BenchQueries<'_> {
+    type Output = ();
+
+    fn visit<P: Proofs>(self, proofs: &P) {
+        bench_queries(self.c, self.name, self.world, proofs, self.queries);
+    }
+}
+
 fn bench(c: &mut Criterion) {
     let scene = scene();
     let world = World::new(&scene);
@@ -63,17 +78,11 @@ fn bench(c: &mut Criterion) {
             .0
     };
     for method in Method::ALL {
-        match build(method) {
-            Acceleration::None(p) => bench_queries(c, method.name(), &world, &p, &queries),
-            Acceleration::Ndf(p) => bench_queries(c, method.name(), &world, &p, &queries),
-            Acceleration::Amr(p) => bench_queries(c, method.name(), &world, &p, &queries),
-            Acceleration::NdfSn(p) => bench_queries(c, method.name(), &world, &p, &queries),
-            Acceleration::AmrSn(p) => bench_queries(c, method.name(), &world, &p, &queries),
-        }
+        build(method).accept(BenchQueries { c, name: method.name(), world: &world, queries: &queries });
     }
     let mut group = c.benchmark_group("build");
     group.sample_size(20);
-    for method in [Method::Ndf, Method::Amr, Method::AmrSn] {
+    for method in Method::ALL.into_iter().filter(|&m| m != Method::None) {
         group.bench_function(method.name(), |b| b.iter(|| build(method)));
     }
     group.finish();

@@ -56,7 +56,7 @@ fn render_blocks(name: &str, depth: u32, spp: u32) -> Blocks {
     let scene = builtin(name, &defines);
     let keep = |all: &[f64]| known.iter().map(|&i| all[i]).collect::<Vec<_>>();
     let ours = (0..SEEDS).map(|seed| {
-        let o = RenderOptions { method: Method::AmrSn, seed: Some(u64::from(seed)), spp: Some(spp), ..options() };
+        let o = RenderOptions { method: Method::default(), seed: Some(u64::from(seed)), spp: Some(spp), ..options() };
         keep(&blocks(&rendered(&scene, &o).image, pixels))
     });
     Blocks { ours: ours.collect(), theirs: keep(&theirs), their_variance: keep(&their_variance) }

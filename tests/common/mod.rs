@@ -162,6 +162,6 @@ pub fn builtin(name: &str, defines: &[(&str, &str)]) -> Scene {
 }
 
 /// The methods that prove something.
-pub fn all_methods() -> [Method; 4] {
-    [Method::Ndf, Method::Amr, Method::NdfSn, Method::AmrSn]
+pub fn all_methods() -> Vec<Method> {
+    Method::ALL.into_iter().filter(|&m| m != Method::None).collect()
 }

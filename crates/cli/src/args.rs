@@ -37,7 +37,8 @@ pub(crate) struct RenderArgs {
     /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
-    /// Acceleration of visibility queries: none, ndf, amr, ndf-sn or amr-sn; the image is the same with all
+    /// Acceleration of visibility queries: none, or a field ndf, amr, dsz or dual, each alone or with -sn or -xsn;
+    /// the image is the same with all
     #[arg(long, default_value_t, value_name = "METHOD")]
     pub(crate) method: Method,
     /// Side of a voxel in world units [default: a 128th of the scene's longest side]

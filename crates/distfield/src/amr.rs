@@ -21,12 +21,15 @@
 use rayon::prelude::*;
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
-use crate::{SafeZones, chessboard_distance, rows};
+use crate::{FieldError, SafeZones, chessboard_distance, rows, validate};
 
 /// Bits of an octant's number: set where it extends towards smaller coordinates.
 const MINUS_X: usize = 1;
 const MINUS_Y: usize = 2;
 const MINUS_Z: usize = 4;
+
+/// The names of the eight distances, in the order of the octants' numbers.
+const NAMES: [&str; 8] = ["amr +++", "amr -++", "amr +-+", "amr --+", "amr ++-", "amr -+-", "amr +--", "amr ---"];
 
 /// The octant-wise chessboard distance field; see the head of its source file.
 #[derive(Clone, Debug)]
@@ -88,6 +91,22 @@ impl SafeZones for Amr {
     fn bytes(&self) -> usize {
         self.distances.len()
     }
+
+    fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
+        validate::same_resolution(self.resolution, occupied)?;
+        let plane = |octant| move |voxel| self.distance(octant, voxel);
+        for (octant, name) in NAMES.into_iter().enumerate() {
+            validate::zero_where_occupied(occupied, name, plane(octant))?;
+        }
+        for (octant, name) in NAMES.into_iter().enumerate() {
+            let within = |[x, y, z]: [i64; 3]| {
+                let ahead = |s: i64, minus: usize| if octant & minus == 0 { s >= 0 } else { s <= 0 };
+                ahead(x, MINUS_X) && ahead(y, MINUS_Y) && ahead(z, MINUS_Z)
+            };
+            validate::recurrence(occupied, name, &validate::chessboard_steps(within), plane(octant))?;
+        }
+        Ok(())
+    }
 }
 
 /// An octant of `a` that holds `b`.
@@ -140,5 +159,15 @@ fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
             let start = (j as usize + y as usize * k as usize) * width;
             plane[start..start + width].copy_from_slice(&current);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_damaged_byte_is_found() {
+        validate::tests::assert_damage_is_found(Amr::build, |field| &mut field.distances);
     }
 }

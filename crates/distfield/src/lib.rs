@@ -2,17 +2,30 @@
 //!
 //! A field knows voxels only. It is built from the occupied voxels; then [`SafeZones::proves`] says of two voxels that
 //! no segment between a point of one and a point of the other can be occluded. Where one of the voxels is asked again and again,
-//! a [`SafeNeighbourhood`] answers with one bit. Definitions are those of \[Houska2013\], chapters 3 and 4.
+//! a [`Neighbourhood`] answers with one load: [`SafeNeighbourhood`] with what a field proves, [`ExtendedNeighbourhood`] with all that
+//! a free cuboid can prove. Definitions are those of \[Houska2013\], chapters 3 and 4.
 
 mod amr;
+mod dsz;
+mod dual;
+mod error;
+mod extended;
+mod manhattan;
 mod metric;
 mod ndf;
 mod neighbourhood;
 mod rows;
 mod safe_zones;
+mod validate;
+mod voxel_box;
 
 pub use amr::Amr;
-pub use metric::chessboard_distance;
+pub use dsz::Dsz;
+pub use dual::Dual;
+pub use error::FieldError;
+pub use extended::ExtendedNeighbourhood;
+pub use metric::{chessboard_distance, manhattan_distance};
 pub use ndf::Ndf;
-pub use neighbourhood::SafeNeighbourhood;
+pub use neighbourhood::{Neighbourhood, SafeNeighbourhood};
 pub use safe_zones::SafeZones;
+pub use voxel_box::VoxelBox;

@@ -16,7 +16,7 @@
 
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
-use crate::{SafeZones, chessboard_distance, rows};
+use crate::{FieldError, SafeZones, chessboard_distance, rows, validate};
 
 /// The non-directional chessboard distance field; see the head of its source file.
 #[derive(Clone, Debug)]
@@ -91,6 +91,12 @@ impl SafeZones for Ndf {
     fn bytes(&self) -> usize {
         self.distances.len()
     }
+
+    fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
+        validate::same_resolution(self.resolution, occupied)?;
+        validate::zero_where_occupied(occupied, "ndf", |voxel| self.distance(voxel))?;
+        validate::recurrence(occupied, "ndf", &validate::chessboard_steps(|_| true), |voxel| self.distance(voxel))
+    }
 }
 
 /// The minimum over finished rows and, in the end, over the neighbours along x.
@@ -118,5 +124,15 @@ impl Nearest {
         rows::min_with_next(&mut self.widened, &self.rows);
         rows::min_with(self.widened.get_mut(1..).unwrap_or_default(), &self.rows);
         rows::relax(row, &self.widened);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_damaged_byte_is_found() {
+        validate::tests::assert_damage_is_found(Ndf::build, |field| &mut field.distances);
     }
 }

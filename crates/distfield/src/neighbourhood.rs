@@ -11,24 +11,50 @@
 //!
 //! *Limits.* One set per light. A light in an occupied voxel proves nothing.
 
+use std::borrow::Cow;
+
 use vdf_voxel::{Voxel, VoxelSet};
 
-use crate::SafeZones;
+use crate::{ExtendedNeighbourhood, FieldError, SafeZones, validate};
+
+/// What the neighbourhoods of a light have in common: they know which voxels see all of it.
+pub trait Neighbourhood: Sync {
+    /// True if no segment between the light's voxels and `voxel` can be occluded. False says nothing; so it is for
+    /// a voxel that the grid does not have.
+    fn proves(&self, voxel: Voxel) -> bool;
+
+    /// The voxels of the neighbourhood.
+    fn voxels(&self) -> Cow<'_, VoxelSet>;
+
+    /// The number of voxels in the neighbourhood.
+    fn count(&self) -> usize;
+
+    /// The memory of the neighbourhood in bytes.
+    fn bytes(&self) -> usize;
+
+    /// Checks the neighbourhood against the occupied voxels that it was built from, cheap checks first. What that proves,
+    /// the implementations say.
+    ///
+    /// # Errors
+    /// The first voxel found that is in it and must not be, or the other way round.
+    fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError>;
+}
 
 /// The voxels that a field proves visible from one voxel; see the head of its source file.
 #[derive(Clone, Debug)]
 pub struct SafeNeighbourhood {
+    light: Voxel,
     voxels: VoxelSet,
 }
 
 impl SafeNeighbourhood {
     /// The safe neighbourhood of the voxel `light` in a field that was built from `occupied`; empty if `light` is
-    /// occupied.
+    /// occupied or outside the grid.
     #[must_use]
-    pub fn new<F: SafeZones>(field: &F, occupied: &VoxelSet, light: Voxel) -> Self {
+    pub fn new<F: SafeZones + ?Sized>(field: &F, occupied: &VoxelSet, light: Voxel) -> Self {
         let resolution = field.resolution();
         if occupied.contains(light) || !resolution.contains(light) {
-            return Self { voxels: VoxelSet::new(resolution) };
+            return Self { light, voxels: VoxelSet::new(resolution) };
         }
         let voxels = VoxelSet::from_rows(resolution, |j, k, row| {
             for (word, first) in row.iter_mut().zip((0..resolution.x).step_by(64)) {
@@ -37,31 +63,61 @@ impl SafeNeighbourhood {
                 }
             }
         });
-        Self { voxels }
+        Self { light, voxels }
     }
+}
 
-    /// True if no segment between the light's voxel and `voxel` can be occluded. False says nothing.
-    #[must_use]
+impl Neighbourhood for SafeNeighbourhood {
     #[inline]
-    pub fn proves(&self, voxel: Voxel) -> bool {
+    fn proves(&self, voxel: Voxel) -> bool {
         self.voxels.contains(voxel)
     }
 
-    /// The voxels of the neighbourhood.
-    #[must_use]
-    pub fn voxels(&self) -> &VoxelSet {
-        &self.voxels
+    fn voxels(&self) -> Cow<'_, VoxelSet> {
+        Cow::Borrowed(&self.voxels)
     }
 
-    /// The number of voxels in the neighbourhood.
-    #[must_use]
-    pub fn count(&self) -> usize {
+    fn count(&self) -> usize {
         self.voxels.count()
     }
 
-    /// The memory of the bits in bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
+    fn bytes(&self) -> usize {
         self.voxels.bytes()
+    }
+
+    /// Checks the resolution, that no member is occupied, and that each member and the light span a free cuboid. The last
+    /// proves that no answer is wrong, whatever field it came from; that none is missing, only the field could tell.
+    fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
+        let resolution = self.voxels.resolution();
+        validate::same_resolution(resolution, occupied)?;
+        let wrong = |voxel| Err(FieldError::Member { voxel, expected: false, found: true });
+        self.voxels.iter().find(|&voxel| occupied.contains(voxel)).map_or(Ok(()), wrong)?;
+        let extended = ExtendedNeighbourhood::new(occupied, self.light.into());
+        self.voxels.iter().find(|&voxel| !extended.proves(voxel)).map_or(Ok(()), wrong)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use vdf_voxel::Resolution;
+
+    use super::*;
+    use crate::{Amr, VoxelBox};
+
+    #[test]
+    fn a_wrong_member_is_found() {
+        let resolution = Resolution::new(6, 4, 4);
+        let mut occupied = VoxelSet::new(resolution);
+        occupied.extend([Voxel::new(3, 1, 1), Voxel::new(5, 3, 3)]);
+        let light = Voxel::new(1, 1, 1);
+        let mut near = SafeNeighbourhood::new(&Amr::build(&occupied), &occupied, light);
+        assert_eq!(near.validate(&occupied), Ok(()));
+        for voxel in resolution.voxels() {
+            let free = VoxelBox::spanning(light, voxel).voxels().all(|v| !occupied.contains(v));
+            let before = near.voxels.clone();
+            near.voxels.insert(voxel);
+            assert_eq!(near.validate(&occupied).is_ok(), free, "{voxel:?}");
+            near.voxels = before;
+        }
     }
 }

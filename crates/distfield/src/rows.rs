@@ -59,3 +59,65 @@ pub(crate) fn sweep_down(row: &mut [u8]) {
         *d = last;
     }
 }
+
+/// From which neighbours along an axis a distance may come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ways {
+    /// From both: occupied voxels on either side count.
+    Both,
+    /// From the greater one: only occupied voxels with the same or a greater coordinate count.
+    Plus,
+    /// From the smaller one.
+    Minus,
+}
+
+const RISING: [u8; 255] = {
+    let mut ramp = [0; 255];
+    let mut n = 0;
+    while n < 255 {
+        ramp[n] = n as u8 + 1;
+        n += 1;
+    }
+    ramp
+};
+
+const FALLING: [u8; 255] = {
+    let mut ramp = RISING;
+    ramp.reverse();
+    ramp
+};
+
+/// The distances along a row to its own occupied voxels. Between two of them the distances rise and fall, so ramps are copied
+/// and nothing is computed voxel by voxel.
+pub(crate) fn along_row(words: &[u64], row: &mut [u8], ways: Ways) {
+    let mut start = 0;
+    for (&word, first) in words.iter().zip((0..).step_by(64)) {
+        let mut rest = word;
+        while rest != 0 {
+            let column = first + rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            between(&mut row[start..column], ways, start > 0, true);
+            row[column] = 0;
+            start = column + 1;
+        }
+    }
+    between(&mut row[start..], ways, start > 0, false);
+}
+
+/// A run of free voxels with or without an occupied one before and after it.
+fn between(gap: &mut [u8], ways: Ways, before: bool, after: bool) {
+    let (before, after) = (before && ways != Ways::Plus, after && ways != Ways::Minus);
+    let rising = match (before, after) {
+        (true, true) => gap.len().div_ceil(2),
+        (true, false) => gap.len(),
+        (false, _) => 0,
+    };
+    let (rise, rest) = gap.split_at_mut(rising);
+    let ramp = rise.len().min(RISING.len());
+    rise[..ramp].copy_from_slice(&RISING[..ramp]);
+    rise[ramp..].fill(FAR);
+    let ramp = if after { rest.len().min(FALLING.len()) } else { 0 };
+    let (far, fall) = rest.split_at_mut(rest.len() - ramp);
+    far.fill(FAR);
+    fall.copy_from_slice(&FALLING[FALLING.len() - ramp..]);
+}

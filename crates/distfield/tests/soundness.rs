@@ -3,7 +3,9 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use robust::{Coord, Coord3D, orient2d, orient3d};
-use vdf_distfield::{Amr, Ndf, SafeNeighbourhood, SafeZones};
+use vdf_distfield::{
+    Amr, Dsz, Dual, ExtendedNeighbourhood, Ndf, Neighbourhood, SafeNeighbourhood, SafeZones, VoxelBox,
+};
 use vdf_voxel::{Span, VoxelGrid, voxelize};
 
 fn sign(x: f64) -> i8 {
@@ -168,6 +170,7 @@ proptest! {
         let grid = VoxelGrid::covering(origin, DVec3::splat(SIDE.into()) + shift, size, 1 << 30).expect("a legal grid");
         let occupied = voxelize(&grid, triangles.clone()).expect("finite vertices");
         let (ndf, amr) = (Ndf::build(&occupied), Amr::build(&occupied));
+        let (dsz, dual) = (Dsz::build(&occupied), Dual::build(&occupied));
         for (a, b, vector) in &ends {
             let a = resolve(a, &triangles) + if matches!(a, End::At(_)) { shift } else { DVec3::ZERO };
             let b = resolve(b, &triangles) + if matches!(b, End::At(_)) { shift } else { DVec3::ZERO };
@@ -179,7 +182,7 @@ proptest! {
                 Span::Outside => true,
                 Span::Inside(u, v) => {
                     prop_assert!(grid.resolution().contains(u) && grid.resolution().contains(v));
-                    ndf.proves(u, v) || amr.proves(u, v)
+                    ndf.proves(u, v) || amr.proves(u, v) || dsz.proves(u, v) || dual.proves(u, v)
                 }
             };
             if proved {
@@ -188,16 +191,25 @@ proptest! {
                 }
             }
         }
-        // One light: bits instead of queries.
-        let (light, _, _) = &ends[0];
-        let light = resolve(light, &triangles);
-        if let Some(voxel) = grid.voxel_containing(light) {
+        // One light: bits instead of queries; and an area light, whose points are anywhere on the segment between two.
+        let [light, other] = [&ends[0].0, &ends[0].1].map(|end| resolve(end, &triangles));
+        if let (Some(voxel), Some(end)) = (grid.voxel_containing(light), grid.voxel_containing(other)) {
             let near = SafeNeighbourhood::new(&amr, &occupied, voxel);
-            for (_, b, _) in &ends {
+            let extended = ExtendedNeighbourhood::new(&occupied, voxel.into());
+            let area = ExtendedNeighbourhood::new(&occupied, VoxelBox::spanning(voxel, end));
+            for (n, (_, b, _)) in (0u32..).zip(&ends) {
                 let b = resolve(b, &triangles);
-                if grid.voxel_containing(b).is_some_and(|u| near.proves(u)) {
+                let Some(u) = grid.voxel_containing(b) else { continue };
+                let between = light.lerp(other, f64::from(n % 5) / 4.0);
+                // Rounding may put a point between the two into a voxel next to their box.
+                let sampled = grid.voxel_containing(between).is_some_and(|v| VoxelBox::spanning(voxel, end).contains(v));
+                let proved = [
+                    (near.proves(u) || extended.proves(u)).then_some(light),
+                    (area.proves(u) && sampled).then_some(between),
+                ];
+                for a in proved.into_iter().flatten() {
                     for t in &triangles {
-                        prop_assert!(!hits(light, b, t.map(Vec3::as_dvec3)), "{light} {b} hits {t:?}");
+                        prop_assert!(!hits(a, b, t.map(Vec3::as_dvec3)), "{a} {b} hits {t:?}");
                     }
                 }
             }

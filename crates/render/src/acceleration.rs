@@ -4,24 +4,42 @@ use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use vdf_distfield::{Amr, Ndf, SafeNeighbourhood, SafeZones};
-use vdf_voxel::{VoxelError, VoxelGrid, VoxelSet, voxelize};
+use vdf_distfield::{Amr, Dsz, Dual, ExtendedNeighbourhood, Ndf, Neighbourhood, SafeNeighbourhood, SafeZones};
+use vdf_voxel::{Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
-    Method, Triangle,
+    FieldKind, Method, NeighbourhoodKind, Triangle,
     scene::Emitter,
-    visibility::{FieldProofs, NeighbourhoodProofs, NoProofs},
+    visibility::{FieldProofs, NeighbourhoodProofs, NoProofs, Proofs},
 };
 
-/// The proofs of one method, ready to be asked. Matched once for a whole render, never per query.
+/// The proofs of one method, ready to be asked. Matched once for a whole render, by [`Acceleration::accept`], never per query.
 #[derive(Debug)]
-#[allow(missing_docs, reason = "the variants are the methods")]
+#[allow(missing_docs, reason = "the variants are the fields of the methods")]
 pub enum Acceleration {
     None(NoProofs),
-    Ndf(FieldProofs<Ndf>),
-    Amr(FieldProofs<Amr>),
-    NdfSn(NeighbourhoodProofs<Ndf>),
-    AmrSn(NeighbourhoodProofs<Amr>),
+    Ndf(FieldAcceleration<Ndf>),
+    Amr(FieldAcceleration<Amr>),
+    Dsz(FieldAcceleration<Dsz>),
+    Dual(FieldAcceleration<Dual>),
+}
+
+/// A field, with or without neighbourhoods of the point lights.
+#[derive(Debug)]
+#[allow(missing_docs, reason = "the variants are those of NeighbourhoodKind")]
+pub enum FieldAcceleration<F> {
+    None(FieldProofs<F>),
+    Safe(NeighbourhoodProofs<F, SafeNeighbourhood>),
+    Extended(NeighbourhoodProofs<F, ExtendedNeighbourhood>),
+}
+
+/// What is done with the proofs of a method, whichever that is: compiled for each, so that nothing is decided in its loops.
+pub trait ProofsVisitor {
+    /// The result.
+    type Output;
+
+    /// Does it.
+    fn visit<P: Proofs>(self, proofs: &P) -> Self::Output;
 }
 
 /// What was built, how large it is and how long it took.
@@ -75,60 +93,107 @@ impl Acceleration {
             seconds: [start.elapsed().as_secs_f64(), 0.0, 0.0],
             neighbourhoods: vec![None; emitters.len()],
         };
+        let builder = Builder { grid, occupied: &occupied, emitters, report: &mut report };
         let acceleration = match method {
             Method::None => Self::None(NoProofs),
-            Method::Ndf => Self::Ndf(build_field(grid, &mut report, || Ndf::build(&occupied))),
-            Method::Amr => Self::Amr(build_field(grid, &mut report, || Amr::build(&occupied))),
-            Method::NdfSn => {
-                let base = build_field(grid, &mut report, || Ndf::build(&occupied));
-                Self::NdfSn(build_neighbourhoods(base, &occupied, emitters, &mut report))
-            }
-            Method::AmrSn => {
-                let base = build_field(grid, &mut report, || Amr::build(&occupied));
-                Self::AmrSn(build_neighbourhoods(base, &occupied, emitters, &mut report))
-            }
+            Method::Field(FieldKind::Ndf, kind) => Self::Ndf(builder.field(kind, Ndf::build)),
+            Method::Field(FieldKind::Amr, kind) => Self::Amr(builder.field(kind, Amr::build)),
+            Method::Field(FieldKind::Dsz, kind) => Self::Dsz(builder.field(kind, Dsz::build)),
+            Method::Field(FieldKind::Dual, kind) => Self::Dual(builder.field(kind, Dual::build)),
         };
         Ok((acceleration, report))
     }
 
-    /// For each emitter its safe neighbourhood; none at all with a method that builds none.
+    /// For each emitter the voxels of its neighbourhood, if it has one; none at all with a method that builds none.
     #[must_use]
-    pub fn neighbourhoods(&self) -> &[Option<SafeNeighbourhood>] {
+    pub fn neighbourhoods(&self) -> Vec<Option<VoxelSet>> {
         match self {
-            Self::None(_) | Self::Ndf(_) | Self::Amr(_) => &[],
-            Self::NdfSn(p) => &p.neighbourhoods,
-            Self::AmrSn(p) => &p.neighbourhoods,
+            Self::None(_) => vec![],
+            Self::Ndf(field) => field.neighbourhoods(),
+            Self::Amr(field) => field.neighbourhoods(),
+            Self::Dsz(field) => field.neighbourhoods(),
+            Self::Dual(field) => field.neighbourhoods(),
+        }
+    }
+
+    /// Gives the proofs to `visitor`.
+    pub fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
+        match self {
+            Self::None(proofs) => visitor.visit(proofs),
+            Self::Ndf(field) => field.accept(visitor),
+            Self::Amr(field) => field.accept(visitor),
+            Self::Dsz(field) => field.accept(visitor),
+            Self::Dual(field) => field.accept(visitor),
         }
     }
 }
 
-fn build_field<F: SafeZones>(grid: VoxelGrid, report: &mut BuildReport, build: impl FnOnce() -> F) -> FieldProofs<F> {
-    let start = Instant::now();
-    let field = build();
-    report.seconds[1] = start.elapsed().as_secs_f64();
-    report.bytes[1] = field.bytes();
-    FieldProofs { grid, field }
+impl<F: SafeZones> FieldAcceleration<F> {
+    fn neighbourhoods(&self) -> Vec<Option<VoxelSet>> {
+        fn sets<N: Neighbourhood>(neighbourhoods: &[Option<N>]) -> Vec<Option<VoxelSet>> {
+            neighbourhoods.iter().map(|n| n.as_ref().map(|n| n.voxels().into_owned())).collect()
+        }
+        match self {
+            Self::None(_) => vec![],
+            Self::Safe(proofs) => sets(&proofs.neighbourhoods),
+            Self::Extended(proofs) => sets(&proofs.neighbourhoods),
+        }
+    }
+
+    fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
+        match self {
+            Self::None(proofs) => visitor.visit(proofs),
+            Self::Safe(proofs) => visitor.visit(proofs),
+            Self::Extended(proofs) => visitor.visit(proofs),
+        }
+    }
 }
 
-/// One neighbourhood for each point emitter.
-fn build_neighbourhoods<F: SafeZones>(
-    base: FieldProofs<F>,
-    occupied: &VoxelSet,
-    emitters: &[Emitter],
-    report: &mut BuildReport,
-) -> NeighbourhoodProofs<F> {
-    let start = Instant::now();
-    let neighbourhoods: Vec<_> = emitters
-        .iter()
-        .map(|e| match e {
-            Emitter::Point { position, .. } => {
-                base.grid.voxel_containing(*position).map(|v| SafeNeighbourhood::new(&base.field, occupied, v))
-            }
-            Emitter::Area { .. } | Emitter::Constant { .. } => None,
-        })
-        .collect();
-    report.seconds[2] = start.elapsed().as_secs_f64();
-    report.bytes[2] = neighbourhoods.iter().flatten().map(SafeNeighbourhood::bytes).sum();
-    report.neighbourhoods = neighbourhoods.iter().map(|n| n.as_ref().map(SafeNeighbourhood::count)).collect();
-    NeighbourhoodProofs { base, neighbourhoods }
+/// Builds a field and its neighbourhoods and writes down what that took.
+struct Builder<'a> {
+    grid: VoxelGrid,
+    occupied: &'a VoxelSet,
+    emitters: &'a [Emitter],
+    report: &'a mut BuildReport,
+}
+
+impl Builder<'_> {
+    fn field<F: SafeZones>(self, kind: NeighbourhoodKind, build: impl FnOnce(&VoxelSet) -> F) -> FieldAcceleration<F> {
+        let start = Instant::now();
+        let field = build(self.occupied);
+        self.report.seconds[1] = start.elapsed().as_secs_f64();
+        self.report.bytes[1] = field.bytes();
+        let base = FieldProofs { grid: self.grid, field };
+        let occupied = self.occupied;
+        match kind {
+            NeighbourhoodKind::None => FieldAcceleration::None(base),
+            NeighbourhoodKind::Safe => FieldAcceleration::Safe(
+                self.neighbourhoods(base, |base, light| SafeNeighbourhood::new(&base.field, occupied, light)),
+            ),
+            NeighbourhoodKind::Extended => FieldAcceleration::Extended(
+                self.neighbourhoods(base, |_, light| ExtendedNeighbourhood::new(occupied, light.into())),
+            ),
+        }
+    }
+
+    /// One neighbourhood for each point emitter in the grid.
+    fn neighbourhoods<F: SafeZones, N: Neighbourhood + Send>(
+        self,
+        base: FieldProofs<F>,
+        build: impl Fn(&FieldProofs<F>, Voxel) -> N + Sync,
+    ) -> NeighbourhoodProofs<F, N> {
+        let start = Instant::now();
+        let neighbourhoods: Vec<_> = self
+            .emitters
+            .par_iter()
+            .map(|e| match e {
+                Emitter::Point { position, .. } => self.grid.voxel_containing(*position).map(|v| build(&base, v)),
+                Emitter::Area { .. } | Emitter::Constant { .. } => None,
+            })
+            .collect();
+        self.report.seconds[2] = start.elapsed().as_secs_f64();
+        self.report.bytes[2] = neighbourhoods.iter().flatten().map(N::bytes).sum();
+        self.report.neighbourhoods = neighbourhoods.iter().map(|n| n.as_ref().map(N::count)).collect();
+        NeighbourhoodProofs { base, neighbourhoods }
+    }
 }

@@ -28,7 +28,7 @@ mod visibility;
 mod voxels;
 mod world;
 
-pub use acceleration::{Acceleration, BuildReport};
+pub use acceleration::{Acceleration, BuildReport, FieldAcceleration, ProofsVisitor};
 pub use atomic_file::{check_writable, write_atomically};
 pub use error::RenderError;
 pub use image::Image;
@@ -36,7 +36,7 @@ pub use image_io::{AttributeValue, ImageError, read_exr, write_exr, write_png};
 pub use lights::{LightSample, Lights};
 pub use media::{Flight, Media};
 pub use mesh::Triangle;
-pub use method::{Method, UnknownMethod};
+pub use method::{FieldKind, Method, NeighbourhoodKind, UnknownMethod};
 pub use metrics::{Comparison, compare};
 pub use options::{IntegratorKind, Progress, RenderOptions};
 pub use render::{Rendering, render};

@@ -3,35 +3,82 @@
 use std::{fmt, str::FromStr};
 
 /// How visibility queries are accelerated; see `docs/ARCHITECTURE.md`. All methods give the same image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Every query goes to the hierarchy.
     None,
-    /// One chessboard distance a voxel (Def. 8 in \[Houska2013\]).
+    /// A distance field, and what is kept for each point light.
+    Field(FieldKind, NeighbourhoodKind),
+}
+
+/// A distance field with safe zones; the definitions are those of \[Houska2013\].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldKind {
+    /// One chessboard distance a voxel (Def. 8).
     Ndf,
     /// Anisotropic macro-regions: a chessboard distance for each octant (Def. 9, 10).
     Amr,
-    /// `ndf` with a safe neighbourhood for each point light (Def. 14).
-    NdfSn,
-    /// `amr` with a safe neighbourhood for each point light.
-    #[default]
-    AmrSn,
+    /// Directed safe zones: a Manhattan distance for each face (Def. 11, 12).
+    Dsz,
+    /// Dual extents: one Manhattan distance, and six extents (Def. 13, corrected).
+    Dual,
 }
+
+/// What answers queries to a point light; all other queries ask the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NeighbourhoodKind {
+    /// The field.
+    None,
+    /// `-sn`: the answers of the field, kept for each light (Def. 14).
+    Safe,
+    /// `-xsn`: all that free cuboids prove (4.4.1).
+    Extended,
+}
+
+/// All methods with their names, the plainest first.
+const NAMES: [(Method, &str); 13] = {
+    use FieldKind::{Amr, Dsz, Dual, Ndf};
+    use NeighbourhoodKind::{Extended, None, Safe};
+    [
+        (Method::None, "none"),
+        (Method::Field(Ndf, None), "ndf"),
+        (Method::Field(Ndf, Safe), "ndf-sn"),
+        (Method::Field(Ndf, Extended), "ndf-xsn"),
+        (Method::Field(Amr, None), "amr"),
+        (Method::Field(Amr, Safe), "amr-sn"),
+        (Method::Field(Amr, Extended), "amr-xsn"),
+        (Method::Field(Dsz, None), "dsz"),
+        (Method::Field(Dsz, Safe), "dsz-sn"),
+        (Method::Field(Dsz, Extended), "dsz-xsn"),
+        (Method::Field(Dual, None), "dual"),
+        (Method::Field(Dual, Safe), "dual-sn"),
+        (Method::Field(Dual, Extended), "dual-xsn"),
+    ]
+};
 
 impl Method {
     /// All methods, the plainest first.
-    pub const ALL: [Self; 5] = [Self::None, Self::Ndf, Self::Amr, Self::NdfSn, Self::AmrSn];
+    pub const ALL: [Self; NAMES.len()] = {
+        let mut all = [Self::None; NAMES.len()];
+        let mut n = 0;
+        while n < all.len() {
+            all[n] = NAMES[n].0;
+            n += 1;
+        }
+        all
+    };
 
     /// The name on the command line.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Ndf => "ndf",
-            Self::Amr => "amr",
-            Self::NdfSn => "ndf-sn",
-            Self::AmrSn => "amr-sn",
-        }
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(method, _)| *method == self).map_or("", |(_, name)| name)
+    }
+}
+
+impl Default for Method {
+    /// `amr-sn`.
+    fn default() -> Self {
+        Self::Field(FieldKind::Amr, NeighbourhoodKind::Safe)
     }
 }
 
@@ -43,14 +90,14 @@ impl fmt::Display for Method {
 
 /// A name that is none of the methods'.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown method; the methods are none, ndf, amr, ndf-sn and amr-sn")]
+#[error("unknown method; the methods are {}", NAMES.map(|(_, name)| name).join(", "))]
 pub struct UnknownMethod;
 
 impl FromStr for Method {
     type Err = UnknownMethod;
 
     fn from_str(name: &str) -> Result<Self, UnknownMethod> {
-        Self::ALL.into_iter().find(|m| m.name() == name).ok_or(UnknownMethod)
+        NAMES.iter().find(|(_, n)| *n == name).map(|(method, _)| *method).ok_or(UnknownMethod)
     }
 }
 
@@ -62,7 +109,10 @@ mod tests {
     fn names_round_trip() {
         for m in Method::ALL {
             assert_eq!(m.to_string().parse(), Ok(m));
+            assert_eq!(Method::ALL.iter().filter(|other| other.name() == m.name()).count(), 1);
+            assert!(UnknownMethod.to_string().contains(m.name()));
         }
         assert_eq!("AMR".parse::<Method>(), Err(UnknownMethod));
+        assert_eq!(Method::default().name(), "amr-sn");
     }
 }

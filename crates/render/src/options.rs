@@ -46,7 +46,7 @@ impl Default for RenderOptions {
     /// `volpath` with `amr-sn`, at most 2²⁹ voxels (4 GiB), all else from the scene.
     fn default() -> Self {
         Self {
-            method: Method::AmrSn,
+            method: Method::default(),
             voxel_size: None,
             integrator: IntegratorKind::Volpath,
             spp: None,

@@ -8,7 +8,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::{
-    Acceleration, Image, IntegratorKind, Progress, RenderError, RenderOptions, Rgb, Sampler, Statistics, World,
+    Acceleration, Image, IntegratorKind, Progress, ProofsVisitor, RenderError, RenderOptions, Rgb, Sampler, Statistics,
+    World,
     integrator::{Integrator, PathRay},
     options::{default_voxel_size, on_threads},
     scene::{PixelRect, Scene},
@@ -68,13 +69,7 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
         seed: options.seed.unwrap_or(scene.seed),
         segment_first: options.segment_first,
     };
-    let (pixels, counters) = match &acceleration {
-        Acceleration::None(p) => job.run(p, progress),
-        Acceleration::Ndf(p) => job.run(p, progress),
-        Acceleration::Amr(p) => job.run(p, progress),
-        Acceleration::NdfSn(p) => job.run(p, progress),
-        Acceleration::AmrSn(p) => job.run(p, progress),
-    }?;
+    let (pixels, counters) = acceleration.accept(Run { job: &job, progress })?;
     let mut image = Image::cropped([scene.film.width, scene.film.height], job.crop);
     image.pixels = pixels;
     let statistics = Statistics::new(&Record {
@@ -101,6 +96,20 @@ struct Job<'a> {
     spp: u32,
     seed: u64,
     segment_first: bool,
+}
+
+/// Runs a job with the proofs of its method.
+struct Run<'a> {
+    job: &'a Job<'a>,
+    progress: &'a dyn Progress,
+}
+
+impl ProofsVisitor for Run<'_> {
+    type Output = Result<(Vec<Rgb>, Counters), RenderError>;
+
+    fn visit<P: Proofs>(self, proofs: &P) -> Self::Output {
+        self.job.run(proofs, self.progress)
+    }
 }
 
 impl Job<'_> {

@@ -4,7 +4,7 @@
 //! geometry, and the hierarchy's answer is exact, so the answer is the same with every method.
 
 use glam::DVec3;
-use vdf_distfield::{SafeNeighbourhood, SafeZones};
+use vdf_distfield::{Neighbourhood, SafeZones};
 use vdf_voxel::{Span, VoxelGrid};
 
 use crate::geometry::{Bvh, Hit, Segment};
@@ -45,7 +45,7 @@ impl Proofs for NoProofs {
     }
 }
 
-/// The methods `ndf` and `amr`: one of the end points' voxels lies in the safe zone of the other's.
+/// A method without a suffix: one of the end points' voxels lies in the safe zone of the other's.
 #[derive(Debug)]
 pub struct FieldProofs<F> {
     /// The grid of the field.
@@ -71,16 +71,17 @@ impl<F: SafeZones> Proofs for FieldProofs<F> {
     }
 }
 
-/// The methods `-sn`: for each point emitter one bit a voxel (Def. 14 in \[Houska2013\]); other emitters ask the field.
+/// The methods `-sn` and `-xsn`: for each point emitter the voxels that see it (Def. 14 and 4.4.1 in \[Houska2013\]); other
+/// emitters ask the field.
 #[derive(Debug)]
-pub struct NeighbourhoodProofs<F> {
+pub struct NeighbourhoodProofs<F, N> {
     /// The field and its grid.
     pub base: FieldProofs<F>,
     /// For each emitter its neighbourhood, if it is a point inside the grid.
-    pub neighbourhoods: Vec<Option<SafeNeighbourhood>>,
+    pub neighbourhoods: Vec<Option<N>>,
 }
 
-impl<F: SafeZones> Proofs for NeighbourhoodProofs<F> {
+impl<F: SafeZones, N: Neighbourhood> Proofs for NeighbourhoodProofs<F, N> {
     #[inline]
     fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
         match (&self.neighbourhoods[emitter], self.base.grid.voxel_containing(from)) {

@@ -1,7 +1,6 @@
 //! The voxels of a scene, to look at: what a method works on, without a render.
 
 use rayon::prelude::*;
-use vdf_distfield::SafeNeighbourhood;
 use vdf_voxel::{VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
@@ -17,8 +16,8 @@ pub struct SceneVoxels {
     pub grid: VoxelGrid,
     /// Σ′, the voxels that touch an occluder.
     pub occupied: VoxelSet,
-    /// For each emitter of the scene its neighbourhood, if the method builds one for it.
-    pub neighbourhoods: Vec<Option<SafeNeighbourhood>>,
+    /// For each emitter of the scene the voxels of its neighbourhood, if the method builds one for it.
+    pub neighbourhoods: Vec<Option<VoxelSet>>,
     /// Sizes and times of the method's structures.
     pub build: BuildReport,
 }
@@ -45,10 +44,8 @@ impl SceneVoxels {
             let occupied = voxelize(&grid, world.triangles.par_iter().map(|t| t.vertices))?;
             let (acceleration, build) =
                 Acceleration::build(method, &world.triangles, world.bounds, &scene.emitters, size, max_voxels)?;
-            let neighbourhoods = match acceleration.neighbourhoods() {
-                [] => vec![None; scene.emitters.len()],
-                neighbourhoods => neighbourhoods.to_vec(),
-            };
+            let mut neighbourhoods = acceleration.neighbourhoods();
+            neighbourhoods.resize(scene.emitters.len(), None);
             Ok(Self { grid, occupied, neighbourhoods, build })
         })
     }

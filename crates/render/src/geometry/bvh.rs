@@ -8,14 +8,16 @@
 //! precision neither overflows nor underflows whatever the unit of the scene, and the absolute constants inside obvhs have
 //! one known weight.
 
-use std::time::Duration;
-
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, UVec2, Vec3A, uvec2};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
-    cwbvh::{CwBvh, builder::build_cwbvh},
-    ray::{Ray, RayHit},
+    bvh2::reinsertion::ReinsertionOptimizer,
+    cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh},
+    fast_stack,
+    ploc::PlocBuilder,
+    ray::Ray,
+    traverse,
 };
 
 use super::intersect::{Segment, SegmentTest};
@@ -35,6 +37,8 @@ pub struct Hit {
 /// A hierarchy over triangles; immutable and shared by all threads.
 pub struct Bvh {
     tree: CwBvh,
+    /// Levels of nodes: as many groups of nodes may wait during a traversal.
+    depth: usize,
     /// In the order of the tree's leaves, for locality.
     triangles: Vec<Triangle>,
     /// The number that each of `triangles` had when it was given.
@@ -102,19 +106,23 @@ impl Bvh {
         let scale = if largest > 0.0 { (-largest.log2().floor() - 1.0).exp2() } else { 1.0 };
         let boxes: Vec<Aabb> = triangles
             .iter()
-            .map(|t| {
+            .zip(0_u32..)
+            .map(|(t, number)| {
                 let mut b = Aabb::empty();
                 for v in t.vertices_f64() {
                     b.extend(Vec3A::from((v * scale).as_vec3()));
                 }
-                Aabb::new(b.min - PAD as f32, b.max + PAD as f32)
+                // Among equal boxes obvhs joins one pair at a time, into a chain, in quadratic time. So no two are equal: Fibonacci
+                // hashing spreads the numbers of neighbours.
+                let unequal = f64::from(number.wrapping_mul(0x9E37_79B9)) / f64::from(u32::MAX);
+                let pad = (PAD * (1.0 + unequal)) as f32;
+                Aabb::new(b.min - pad, b.max + pad)
             })
             .collect();
-        let mut core_time = Duration::ZERO;
-        let tree = build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut core_time);
+        let tree = build(&boxes);
         let numbers = tree.primitive_indices.clone();
         let ordered = numbers.iter().map(|&i| triangles[i as usize]).collect();
-        Self { tree, triangles: ordered, numbers, min, max, scale, pad: PAD / scale }
+        Self { depth: depth(&tree), tree, triangles: ordered, numbers, min, max, scale, pad: PAD / scale }
     }
 
     /// Bounds of the triangles, `None` if there are none.
@@ -136,7 +144,7 @@ impl Bvh {
                 return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
             }
         };
-        self.tree.ray_traverse(ray, &mut RayHit::none(), |_, slot| {
+        self.traverse(ray, |slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
                 let triangle = self.numbers[slot];
                 if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
@@ -160,9 +168,12 @@ impl Bvh {
             Approach::Ray(ray, _) => ray,
             Approach::Far => return self.all_hits(&test).next().is_some(),
         };
-        !self.tree.ray_traverse_miss(ray, |_, slot| {
-            if test.intersect(&self.triangles[slot]).is_some() { f32::NEG_INFINITY } else { f32::INFINITY }
-        })
+        let mut occluded = false;
+        self.traverse(ray, |slot| {
+            occluded = test.intersect(&self.triangles[slot]).is_some();
+            if occluded { f32::NEG_INFINITY } else { f32::INFINITY }
+        });
+        occluded
     }
 
     /// Calls `visit` with every triangle that the closed segment meets, in no particular order.
@@ -174,10 +185,41 @@ impl Bvh {
             Approach::Ray(ray, _) => ray,
             Approach::Far => return self.all_hits(&test).for_each(visit),
         };
-        self.tree.ray_traverse_anyhit(ray, |_, slot| {
+        self.traverse(ray, |slot| {
             if let Some(hit) = test.intersect(&self.triangles[slot]) {
                 visit(Hit { triangle: self.numbers[slot], t: hit.t, barycentric: hit.barycentric });
             }
+            f32::INFINITY
+        });
+    }
+
+    /// Calls `visit` with the slots of all triangles in whose boxes the ray comes. The ray ends at the smallest parameter that `visit`
+    /// returned; −∞ ends the traversal.
+    #[inline(always)]
+    fn traverse(&self, mut ray: Ray, mut visit: impl FnMut(usize) -> f32) {
+        if self.tree.nodes.is_empty() {
+            return;
+        }
+        // obvhs's own traversals have room for 32 levels, which is not enough where many triangles coincide.
+        fast_stack!(UVec2, (32), self.depth, stack, {
+            let mut state = Traversal {
+                stack,
+                current_group: uvec2(0, 0x8000_0000),
+                primitive_group: UVec2::ZERO,
+                oct_inv4: octant(ray.direction),
+                primitive_id: 0,
+                hitmask: 0,
+            };
+            let mut node;
+            traverse!(self.tree, node, state, node.intersect_ray(&ray, state.oct_inv4), {
+                let t = visit(state.primitive_id as usize);
+                if t < ray.tmax {
+                    if t == f32::NEG_INFINITY {
+                        return;
+                    }
+                    ray.tmax = t;
+                }
+            });
         });
     }
 
@@ -235,4 +277,54 @@ impl Bvh {
     fn ray_parameter(&self, distance: f64) -> f32 {
         ((distance * (1.0 + 1e-6) + self.pad) * (self.scale / SPEED)) as f32
     }
+}
+
+/// What obvhs's `traverse!` keeps, with a stack of any size.
+struct Traversal<S> {
+    stack: S,
+    current_group: UVec2,
+    primitive_group: UVec2,
+    oct_inv4: u32,
+    primitive_id: u32,
+    hitmask: u32,
+}
+
+/// In each byte which child is nearest for a direction: a bit is set for each axis along which it does not point backwards.
+#[inline]
+fn octant(direction: Vec3A) -> u32 {
+    let forwards = |component: f32, bit: u32| if component < 0.0 { 0 } else { bit };
+    (forwards(direction.x, 4) | forwards(direction.y, 2) | forwards(direction.z, 1)) * 0x0101_0101
+}
+
+/// The steps of obvhs's `build_cwbvh` without its check in debug builds, which refuses deep trees.
+fn build(boxes: &[Aabb]) -> CwBvh {
+    let Ok(n) = u32::try_from(boxes.len()) else { return CwBvh::default() };
+    if n == 0 {
+        return CwBvh::default();
+    }
+    let p = BvhBuildParams::medium_build();
+    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
+        p.ploc_search_distance,
+        boxes,
+        (0..n).collect(),
+        p.sort_precision,
+        p.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut binary, p.reinsertion_batch_ratio, None);
+    bvh2_to_cwbvh(&binary, 3, true, false)
+}
+
+/// The number of levels of nodes.
+fn depth(tree: &CwBvh) -> usize {
+    let mut levels = 0;
+    let mut level: Vec<usize> = if tree.nodes.is_empty() { vec![] } else { vec![0] };
+    while !level.is_empty() {
+        levels += 1;
+        let children = |&i: &usize| {
+            let first = tree.nodes[i].child_base_idx as usize;
+            first..first + tree.nodes[i].imask.count_ones() as usize
+        };
+        level = level.iter().flat_map(children).collect();
+    }
+    levels
 }

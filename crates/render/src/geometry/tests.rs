@@ -175,3 +175,20 @@ fn hierarchy_finds_hits_far_from_the_origin() {
         }
     }
 }
+
+/// Nothing divides coincident triangles, so the tree may be as deep as it likes.
+#[test]
+fn many_coincident_triangles_are_one() {
+    for count in [2, 1000, 100_000] {
+        let t = Triangle::new(Vec3::ZERO, Vec3::X, Vec3::Y);
+        let far = Triangle::new(Vec3::Z, Vec3::X + Vec3::Z, Vec3::Y + Vec3::Z);
+        let bvh = Bvh::new(&[vec![far; count / 2], vec![t; count]].concat());
+        let p = DVec3::new(0.25, 0.25, -1.0);
+        assert_eq!(bvh.intersect(&Segment::new(p, p + DVec3::Z * 9.0)).map(|h| h.triangle as usize), Some(count / 2));
+        assert!(bvh.occluded(&Segment::new(p, p + DVec3::Z * 9.0)));
+        assert!(!bvh.occluded(&Segment::new(p, p + DVec3::Z * 0.5)));
+        let mut hits = 0;
+        bvh.visit_hits(&Segment::new(p, p + DVec3::Z * 9.0), |_| hits += 1);
+        assert_eq!(hits, count + count / 2);
+    }
+}

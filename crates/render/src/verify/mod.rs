@@ -29,7 +29,7 @@ pub use self::{
     segments::SegmentClass,
 };
 use crate::{
-    Acceleration, Answer, Method, Progress, Proofs, RenderError, World,
+    Acceleration, Answer, Method, Progress, Proofs, ProofsVisitor, RenderError, World,
     options::{check_voxel_size, default_voxel_size, fail, on_threads},
     scene::Scene,
 };
@@ -140,7 +140,7 @@ fn verify_in_pool(
         let start = Instant::now();
         let [from, to] = [number, number + 1].map(|n| part(options.segments, n.into(), sizes.len() as u64));
         let run = Run {
-            claimants: methods.iter().map(claimant).collect(),
+            claimants: methods.iter().map(|m| m as &dyn Claimant).collect(),
             names: &names,
             generator: Generator::new(scene, &world, grid, options.seed, number),
             oracle: &oracle,
@@ -186,30 +186,34 @@ trait Claimant: Sync {
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32);
 }
 
-impl<P: Proofs> Claimant for P {
+impl Claimant for Acceleration {
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
-        for (query, claims) in queries.iter().zip(claims) {
+        self.accept(Claim { queries, claims, bit });
+    }
+}
+
+/// Asks proofs about a block of segments: sets bit `bit` of what is claimed of each of `queries`.
+struct Claim<'a> {
+    queries: &'a [Query],
+    claims: &'a mut [Claims],
+    bit: u32,
+}
+
+impl ProofsVisitor for Claim<'_> {
+    type Output = ();
+
+    fn visit<P: Proofs>(self, proofs: &P) {
+        for (query, claims) in self.queries.iter().zip(self.claims) {
             let (p, q) = (query.segment.p, query.segment.q);
             // A query towards an emitter may have an answer of its own; the one for any two points has to be right as well.
-            for answer in [query.emitter.map(|e| self.answer(e, p, q)), Some(self.answer_between(p, q))] {
+            for answer in [query.emitter.map(|e| proofs.answer(e, p, q)), Some(proofs.answer_between(p, q))] {
                 match answer {
-                    Some(Answer::Unoccluded) => claims.unoccluded |= 1 << bit,
-                    Some(Answer::Occluded) => claims.occluded |= 1 << bit,
+                    Some(Answer::Unoccluded) => claims.unoccluded |= 1 << self.bit,
+                    Some(Answer::Occluded) => claims.occluded |= 1 << self.bit,
                     Some(Answer::Unknown) | None => {}
                 }
             }
         }
-    }
-}
-
-/// The only place that knows how proofs are stored.
-fn claimant(acceleration: &Acceleration) -> &dyn Claimant {
-    match acceleration {
-        Acceleration::None(p) => p,
-        Acceleration::Ndf(p) => p,
-        Acceleration::Amr(p) => p,
-        Acceleration::NdfSn(p) => p,
-        Acceleration::AmrSn(p) => p,
     }
 }
 

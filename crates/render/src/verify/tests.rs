@@ -80,12 +80,18 @@ impl Proofs for Liar {
     }
 }
 
+impl Claimant for Liar {
+    fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
+        Claim { queries, claims, bit }.visit(self);
+    }
+}
+
 fn asked(proofs: &Liar, segments: u64) -> Sum {
     let scene = scene();
     let world = World::new(&scene);
     let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, 0.125, 1 << 20).unwrap();
     let run = Run {
-        claimants: vec![&NoProofs, proofs],
+        claimants: vec![&Acceleration::None(NoProofs), proofs],
         names: &["none", "liar"],
         generator: Generator::new(&scene, &world, grid, 3, 0),
         oracle: &Oracle::new(&world),
