@@ -13,7 +13,6 @@
 mod clip;
 mod error;
 mod grid;
-mod sat;
 mod set;
 mod voxelize;
 
@@ -21,4 +20,4 @@ pub use clip::Span;
 pub use error::VoxelError;
 pub use grid::{Resolution, Voxel, VoxelGrid};
 pub use set::VoxelSet;
-pub use voxelize::voxelize;
+pub use voxelize::{Voxelizer, voxelize, voxelize_with};
