@@ -6,14 +6,15 @@ use crate::set::{bit_address, words_per_row};
 use crate::{Resolution, Voxel, VoxelSet};
 
 /// Bits that many threads set at once. OR commutes, so the result does not depend on their timing.
-pub(super) struct AtomicBits {
+#[derive(Debug)]
+pub(crate) struct AtomicBits {
     resolution: Resolution,
     words_per_row: usize,
     words: Vec<AtomicU64>,
 }
 
 impl AtomicBits {
-    pub(super) fn new(resolution: Resolution) -> Self {
+    pub(crate) fn new(resolution: Resolution) -> Self {
         let words_per_row = words_per_row(resolution);
         let count = words_per_row * resolution.y as usize * resolution.z as usize;
         Self { resolution, words_per_row, words: std::iter::repeat_with(AtomicU64::default).take(count).collect() }
@@ -21,7 +22,7 @@ impl AtomicBits {
 
     /// Adds the voxels from (`first`, j, k) to (`last`, j, k), which the grid must have.
     #[inline]
-    pub(super) fn insert_run(&self, j: u32, k: u32, [first, last]: [u32; 2]) {
+    pub(crate) fn insert_run(&self, j: u32, k: u32, [first, last]: [u32; 2]) {
         let (start, first_bit) = bit_address(self.resolution, self.words_per_row, Voxel::new(first, j, k));
         let (end, last_bit) = bit_address(self.resolution, self.words_per_row, Voxel::new(last, j, k));
         let (from_first, to_last) = (u64::MAX << first_bit, u64::MAX >> (63 - last_bit));
@@ -45,7 +46,7 @@ impl AtomicBits {
         }
     }
 
-    pub(super) fn into_set(self) -> VoxelSet {
+    pub(crate) fn into_set(self) -> VoxelSet {
         VoxelSet::from_words(self.resolution, self.words.into_iter().map(AtomicU64::into_inner).collect())
     }
 }

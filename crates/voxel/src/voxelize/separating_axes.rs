@@ -1,4 +1,4 @@
-//! The separating-axis test of a triangle and dilated unit cubes, prepared for many cubes of one triangle.
+//! Voxelization by the separating-axis test of a triangle and dilated unit cubes, prepared for many cubes of one triangle.
 //!
 //! A closed triangle and a closed box are disjoint iff one of 13 axes separates them: the 3 axes of the box, the normal
 //! of the triangle, and the 9 products of a box axis and an edge (Akenine-Möller). The products with one box axis live in
@@ -10,8 +10,6 @@
 //! those that they require.
 
 use glam::DVec3;
-
-use super::Bounds;
 
 /// Axes shorter than this (in the 1-norm) are not used: near the denormals relative error bounds fail.
 const SHORTEST_AXIS: f64 = 1e-180;
@@ -26,13 +24,13 @@ struct PlanarAxis {
 
 /// The three edge axes of the triangle projected along a coordinate axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Projection {
+struct Projection {
     axes: [PlanarAxis; 3],
 }
 
 impl Projection {
     /// Prepares the projection to the coordinates `u` and `v`; `radius` is half of the dilated voxel.
-    pub(super) fn new(vertices: &[DVec3; 3], u: usize, v: usize, radius: f64) -> Self {
+    fn new(vertices: &[DVec3; 3], u: usize, v: usize, radius: f64) -> Self {
         let points = vertices.map(|p| [p[u], p[v]]);
         let axes = [0, 1, 2].map(|edge| {
             let [p, q] = [points[edge], points[(edge + 1) % 3]];
@@ -50,7 +48,7 @@ impl Projection {
 
     /// False if an axis separates the triangle from the voxel that is centred at these coordinates.
     #[inline]
-    pub(super) fn touches(&self, u: f64, v: f64) -> bool {
+    fn touches(&self, u: f64, v: f64) -> bool {
         self.axes.iter().all(|axis| {
             let dot = axis.a[0] * u + axis.a[1] * v;
             axis.low <= dot && dot <= axis.high
@@ -60,19 +58,19 @@ impl Projection {
 
 /// The normal as an axis, solved for one coordinate.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slab {
+struct Slab {
     n: DVec3,
     low: f64,
     high: f64,
     /// The coordinate along which the normal is longest, or the triangle if it has no normal.
-    pub(super) axis: usize,
+    axis: usize,
     /// The normal is long enough to be used.
     usable: bool,
 }
 
 impl Slab {
     /// Prepares the normal axis; `radius` is half of the dilated voxel.
-    pub(super) fn new(vertices: &[DVec3; 3], radius: f64) -> Self {
+    fn new(vertices: &[DVec3; 3], radius: f64) -> Self {
         let [a, b, c] = *vertices;
         let n = (b - a).cross(c - a);
         let norm = n.abs().element_sum();
@@ -86,9 +84,9 @@ impl Slab {
     /// `u`, `v` on the next two axes in cyclic order.
     ///
     /// The 1-norm of the normal is at most three times its longest coordinate, so the interval is off by at most
-    /// three times the error of the test: callers widen it by 4δ.
+    /// three times the error of the test: callers widen it by 4δ, and then ask [`Slab::touches`].
     #[inline]
-    pub(super) fn depths(&self, u: f64, v: f64) -> (f64, f64) {
+    fn depths(&self, u: f64, v: f64) -> (f64, f64) {
         if !self.usable {
             return (f64::NEG_INFINITY, f64::INFINITY);
         }
@@ -97,6 +95,15 @@ impl Slab {
         let (d0, d1) = ((self.low - dot) / self.n[self.axis], (self.high - dot) / self.n[self.axis]);
         (d0.min(d1), d0.max(d1))
     }
+
+    /// False if the normal separates the triangle from the voxel centred at these coordinates: on the next two axes
+    /// after `self.axis` in cyclic order, then on that axis.
+    #[inline]
+    fn touches(&self, u: f64, v: f64, w: f64) -> bool {
+        let n = |step: usize| self.n[(self.axis + step) % 3];
+        let dot = n(1) * u + n(2) * v + n(0) * w;
+        !self.usable || (self.low <= dot && dot <= self.high)
+    }
 }
 
 fn range(values: [f64; 3]) -> (f64, f64) {
@@ -104,8 +111,11 @@ fn range(values: [f64; 3]) -> (f64, f64) {
     (a.min(b).min(c), a.max(b).max(c))
 }
 
-/// Visits the voxels of a box around the triangle that it touches, column by column.
-pub(super) fn scan(vertices: &[DVec3; 3], bounds: &Bounds, dilation: f64, mut visit: impl FnMut([u32; 3])) {
+/// Visits the voxels within bounds that touch a triangle, column by column along the dominant axis of its normal.
+///
+/// A column that the projection of the triangle misses is skipped; the plane of the triangle bounds the run of voxels
+/// worth a test. Neither decides: every voxel that is visited has passed all axes but those of the box, which are the bounds.
+pub(super) fn scan(vertices: &[DVec3; 3], bounds: &[[u32; 2]; 3], dilation: f64, mut visit: impl FnMut([u32; 3])) {
     let radius = 0.5 + dilation;
     let slab = Slab::new(vertices, radius);
     let w = slab.axis;
@@ -130,7 +140,7 @@ pub(super) fn scan(vertices: &[DVec3; 3], bounds: &Bounds, dilation: f64, mut vi
             }
             for cw in first as u32..=last as u32 {
                 let z = f64::from(cw) + 0.5;
-                if along_u.touches(y, z) && along_v.touches(z, x) {
+                if slab.touches(x, y, z) && along_u.touches(y, z) && along_v.touches(z, x) {
                     let mut voxel = [0; 3];
                     (voxel[u], voxel[v], voxel[w]) = (cu, cv, cw);
                     visit(voxel);
