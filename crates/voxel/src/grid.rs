@@ -1,5 +1,7 @@
 //! The voxel grid (Def. 5 and 6 in \[Houska2013\]) and its typed coordinates.
 
+use std::fmt;
+
 use glam::DVec3;
 
 use crate::VoxelError;
@@ -29,6 +31,12 @@ impl Voxel {
     #[inline]
     pub const fn new(i: u32, j: u32, k: u32) -> Self {
         Self { i, j, k }
+    }
+}
+
+impl fmt::Display for Voxel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "({}, {}, {})", self.i, self.j, self.k)
     }
 }
 
@@ -83,6 +91,12 @@ impl Resolution {
     /// All voxels in the order of their linear coordinates.
     pub fn voxels(self) -> impl Iterator<Item = Voxel> {
         (0..self.z).flat_map(move |k| (0..self.y).flat_map(move |j| (0..self.x).map(move |i| Voxel::new(i, j, k))))
+    }
+}
+
+impl fmt::Display for Resolution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} × {} × {}", self.x, self.y, self.z)
     }
 }
 

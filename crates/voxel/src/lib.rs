@@ -14,6 +14,7 @@ mod clip;
 mod error;
 mod grid;
 mod set;
+mod validate;
 mod voxelize;
 
 pub use clip::Span;

@@ -92,9 +92,9 @@ pub(crate) struct GridTriangle {
     /// The first and the last voxel along each axis that the dilated bounds of the triangle touch.
     bounds: [[u32; 2]; 3],
     dilation: f64,
-    /// The dilated bounds lie inside one voxel. (Not: only one voxel is left after clipping; that one the triangle may
-    /// miss.)
-    in_one_voxel: bool,
+    /// Along two axes or all three the dilated bounds lie inside one voxel. Then the triangle touches all the voxels of
+    /// `bounds`, because it is connected. (Not: `bounds` has one voxel; at the grid's border the triangle may miss that.)
+    fills_bounds: bool,
 }
 
 impl GridTriangle {
@@ -119,8 +119,9 @@ impl GridTriangle {
             return Ok(None);
         };
         let corner = DVec3::new(x[0].into(), y[0].into(), z[0].into());
-        let in_one_voxel = (low.cmpge(corner) & high.cmple(corner + 1.0)).all();
-        Ok(Some(Self { vertices, bounds: [x, y, z], dilation, in_one_voxel }))
+        let inside = low.cmpge(corner) & high.cmplt(corner + 1.0);
+        let fills_bounds = inside.bitmask().count_ones() >= 2;
+        Ok(Some(Self { vertices, bounds: [x, y, z], dilation, fills_bounds }))
     }
 
     /// Visits the voxels that the separating-axis test finds.

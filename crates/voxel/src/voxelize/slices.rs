@@ -17,7 +17,7 @@
 //! slivers, needles, segments and points as for any triangle, and cannot overflow. No normal is ever computed.
 //!
 //! *Cost.* One clip for each slice, up to six crossings; one for each row, usually four; one OR for each 64 voxels
-//! of a run. So O(n²) for a triangle across n³ voxels, whatever its direction.
+//! of a run. A triangle inside one voxel, or a straight row of them, needs no clip. So O(n²) for a triangle across n³ voxels, whatever its direction.
 
 use glam::DVec3;
 
@@ -25,9 +25,13 @@ use super::{AtomicBits, GridTriangle, touched};
 
 /// Adds the voxels that touch a triangle.
 pub(super) fn scan(triangle: &GridTriangle, bits: &AtomicBits) {
-    let GridTriangle { vertices, bounds: [x, y, z], dilation, in_one_voxel } = triangle;
-    if *in_one_voxel {
-        bits.insert_run(y[0], z[0], *x);
+    let GridTriangle { vertices, bounds: [x, y, z], dilation, fills_bounds } = triangle;
+    if *fills_bounds {
+        for k in z[0]..=z[1] {
+            for j in y[0]..=y[1] {
+                bits.insert_run(j, k, *x);
+            }
+        }
         return;
     }
     let (columns, rows) = (x[1] + 1, y[1] + 1);
