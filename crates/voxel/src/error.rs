@@ -13,15 +13,15 @@ pub enum VoxelError {
     #[error("the bounds of the scene are empty: the minimum exceeds the maximum")]
     EmptyBounds,
     /// The voxel size is NaN, infinite, zero, negative or absurdly large.
-    #[error("the voxel size must be a positive finite number, not {size}")]
+    #[error("the voxel size must be a positive number of at most 1e60, not {size:?}")]
     InvalidVoxelSize {
         /// The size asked for.
         size: f64,
     },
     /// Voxels are so small that neighbouring single-precision coordinates are whole voxels apart.
     #[error(
-        "a voxel size of {size} is below the single-precision resolution of the scene's coordinates: \
-         the smallest usable voxel size is {smallest}"
+        "a voxel size of {size:?} is below the single-precision resolution of the scene's coordinates: \
+         the smallest usable voxel size is {smallest:?}"
     )]
     TooFine {
         /// The size asked for.
@@ -31,8 +31,8 @@ pub enum VoxelError {
     },
     /// The grid would have more voxels than allowed.
     #[error(
-        "a voxel size of {size} gives {voxels:.3e} voxels, more than the budget of {budget}: \
-         the smallest usable voxel size is {smallest}"
+        "a voxel size of {size:?} gives {voxels:.3e} voxels, more than the budget of {budget}: \
+         the smallest usable voxel size is {smallest:?}"
     )]
     TooManyVoxels {
         /// The size asked for.

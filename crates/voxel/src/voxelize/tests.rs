@@ -137,40 +137,6 @@ proptest! {
 }
 
 #[test]
-fn triangle_in_a_face_marks_both_sides() {
-    for axis in 0..3 {
-        let mut triangle = [[40, 40, 40], [72, 40, 40], [40, 72, 40]].map(|mut v: [i32; 3]| {
-            v.rotate_right(axis);
-            v
-        });
-        for v in &mut triangle {
-            v[(axis + 2) % 3] = 48;
-        }
-        let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
-        let normal = (axis + 2) % 3;
-        let layers: std::collections::BTreeSet<_> = set.iter().map(|v| [v.i, v.j, v.k][normal]).collect();
-        assert_eq!(layers.into_iter().collect::<Vec<_>>(), [2, 3]);
-    }
-}
-
-#[test]
-fn point_on_a_corner_marks_eight_voxels() {
-    assert_eq!(voxelize_snapped([8, 8, 8], 0.0, &[[[32, 48, 64]; 3]]).count(), 8);
-    assert_eq!(voxelize_snapped([8, 8, 8], 0.0, &[[[0, 0, 0]; 3]]).count(), 1);
-}
-
-#[test]
-fn triangles_on_the_greatest_face_mark_the_last_layer() {
-    let triangle = [[0, 0, 128], [128, 0, 128], [0, 128, 128]];
-    let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
-    assert!(!set.is_empty() && set.iter().all(|v| v.k == 7));
-    // A bound that is no whole number of voxels, met exactly.
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(0.3f32.into()), 0.1, 1 << 20).expect("a legal grid");
-    let set = voxelize(&grid, vec![[Vec3::splat(0.3); 3]]).expect("finite");
-    assert!(set.contains(grid.voxel_containing(DVec3::splat(0.3f32.into())).expect("inside")));
-}
-
-#[test]
 fn a_triangle_across_a_large_grid_is_quadratic() {
     let n = 16 * 512;
     let set = voxelize_snapped([512, 512, 512], 0.0, &[[[0, 0, 0], [n, n, 0], [0, n, n]]]);
@@ -192,33 +158,17 @@ fn tiny_and_needle_triangles_do_not_vanish() {
     assert!(across_zero.contains(Voxel::new(0, 4, 4)));
 }
 
+/// The same set from one thread and from many, for every method, although threads race for the words.
 #[test]
-fn vertices_that_are_not_finite_are_errors() {
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let result = voxelize(&grid, vec![[Vec3::ONE; 3], [Vec3::ZERO, Vec3::ONE, Vec3::new(0.0, bad, 0.0)]]);
-        assert_eq!(result, Err(VoxelError::NonFiniteTriangle));
-    }
-    let far = voxelize(&grid, vec![[Vec3::splat(f32::MAX), Vec3::splat(f32::MIN), Vec3::new(f32::MAX, 0.0, 0.0)]]);
-    assert!(far.is_ok_and(|set| (0..8).all(|i| set.contains(Voxel::new(i, i, i)))));
-}
-
-/// Prints the speed of the fast path and of medium triangles: `cargo test --release -p vdf-voxel -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn speed() {
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(256.0), 1.0, 1 << 24).expect("a legal grid");
-    for size in [0.3f32, 3.0, 30.0] {
-        let count = 2_000_000 / (size * size).max(1.0) as usize;
-        let triangles: Vec<_> = (0..count)
-            .map(|n| {
-                let corner = Vec3::new((n * 37 % 2200) as f32, (n * 101 % 2210) as f32, (n * 53 % 2230) as f32) * 0.1;
-                [corner, corner + Vec3::new(size, 0.2 * size, 0.1), corner + Vec3::new(0.1, size, 0.7 * size)]
-            })
-            .collect();
-        let start = std::time::Instant::now();
-        let set = voxelize(&grid, triangles).expect("finite");
-        let seconds = start.elapsed().as_secs_f64();
-        println!("size {size}: {:.2} M triangles/s, {} voxels", count as f64 / seconds * 1e-6, set.count());
+fn threads_do_not_matter() {
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(20.0), 0.3, 1 << 20).expect("a legal grid");
+    let vertex = |n: u32| Vec3::new((n * 37 % 199) as f32, (n * 101 % 193) as f32, (n * 53 % 197) as f32) * 0.1;
+    let triangles: Vec<_> = (0..2000u32).map(|n| [vertex(3 * n), vertex(3 * n + 1), vertex(n)]).collect();
+    for voxelizer in VOXELIZERS {
+        let sets = [1, 2, 7].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| voxelize_with(voxelizer, &grid, triangles.clone()).expect("finite vertices"))
+        });
+        assert!(sets.iter().all(|set| *set == sets[0]), "{voxelizer:?}");
     }
 }
