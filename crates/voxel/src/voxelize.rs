@@ -104,8 +104,7 @@ impl GridTriangle {
         if !triangle.iter().all(|v| v.is_finite()) {
             return Err(VoxelError::NonFiniteTriangle);
         }
-        // Adding zero turns −0.0 into 0.0.
-        let vertices = triangle.map(|v| grid.grid_coordinates(v.as_dvec3()) + DVec3::ZERO);
+        let vertices = triangle.map(|v| grid.grid_coordinates(v.as_dvec3()));
         let [a, b, c] = vertices;
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
         let dilation = share * grid.dilation_reaching(min.abs().max(max.abs()).max_element());

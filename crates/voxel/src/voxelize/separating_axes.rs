@@ -83,8 +83,8 @@ impl Slab {
     /// The interval of centre coordinates along `self.axis` that the normal does not separate, for a column centred at
     /// `u`, `v` on the next two axes in cyclic order.
     ///
-    /// The 1-norm of the normal is at most three times its longest coordinate, so the interval is off by at most
-    /// three times the error of the test: callers widen it by 4δ, and then ask [`Slab::touches`].
+    /// Errors and radius are both divided by the same coordinate of the normal, so the dilation covers the
+    /// rounding of the interval as it covers that of [`Slab::touches`].
     #[inline]
     fn depths(&self, u: f64, v: f64) -> (f64, f64) {
         if !self.usable {
@@ -132,9 +132,9 @@ pub(super) fn scan(vertices: &[DVec3; 3], bounds: &[[u32; 2]; 3], dilation: f64,
                 continue;
             }
             let (near, far) = slab.depths(x, y);
-            // From centres to indices; 4δ covers the rounding of the depths.
-            let first = (near - 0.5 - 4.0 * dilation).ceil().max(f64::from(bounds[w][0]));
-            let last = (far - 0.5 + 4.0 * dilation).floor().min(f64::from(bounds[w][1]));
+            // From centres to indices.
+            let first = (near - 0.5).ceil().max(f64::from(bounds[w][0]));
+            let last = (far - 0.5).floor().min(f64::from(bounds[w][1]));
             if first > last {
                 continue;
             }

@@ -127,11 +127,63 @@ proptest! {
     ) {
         let origin = DVec3::from_array(origin.map(f64::from));
         let grid = VoxelGrid::covering(origin, DVec3::splat(42.0), size, 1 << 30).expect("a legal grid");
-        let set = voxelize(&grid, vec![vertices.map(|v| Vec3::from_array(v.map(|c| c as f32)))]).expect("finite");
         let [a, b, c] = vertices.map(|v| DVec3::from_array(v.map(f64::from)));
-        for point in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (2.0 * a + b + c) / 4.0] {
-            let voxel = grid.voxel_containing(point).expect("inside");
-            prop_assert!(set.contains(voxel), "{point} in {voxel:?}");
+        for voxelizer in VOXELIZERS {
+            let triangle = vertices.map(|v| Vec3::from_array(v.map(|c| c as f32)));
+            let set = voxelize_with(voxelizer, &grid, vec![triangle]).expect("finite");
+            for point in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (2.0 * a + b + c) / 4.0] {
+                let voxel = grid.voxel_containing(point).expect("inside");
+                prop_assert!(set.contains(voxel), "{voxelizer:?}: {point} in {voxel:?}");
+            }
+        }
+    }
+
+    /// Vertices far outside the grid round by more than the grid's own dilation. The middle of an edge is known exactly.
+    #[test]
+    fn points_of_triangles_that_reach_far(
+        size in prop::sample::select(vec![3.0, 7.0, 0.7]),
+        middle in prop::array::uniform3((0..=13i32).prop_map(|c| 3 * c)),
+        direction in prop::array::uniform3(-(1 << 23)..1 << 23i32),
+        third in prop::array::uniform3(-(1 << 23)..1 << 23i32),
+    ) {
+        let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(42.0), size, 1 << 30).expect("a legal grid");
+        let end = |sign: i32| Vec3::from_array([0, 1, 2].map(|axis| (middle[axis] + sign * direction[axis]) as f32));
+        let triangle = [end(1), end(-1), Vec3::from_array(third.map(|c| c as f32))];
+        let voxel = grid.voxel_containing(DVec3::from_array(middle.map(f64::from))).expect("inside");
+        for voxelizer in VOXELIZERS {
+            let set = voxelize_with(voxelizer, &grid, vec![triangle]).expect("finite");
+            prop_assert!(set.contains(voxel), "{voxelizer:?}: {middle:?} in {voxel:?}");
+        }
+    }
+
+    /// Closed to the last bit: right-angled triangles whose legs are powers of two along axes, where nothing rounds,
+    /// without any dilation.
+    #[test]
+    fn equals_the_exact_test_without_dilation_where_nothing_rounds(
+        corner in vertex(), axes in 0..6usize, exponent in 0..8u32, signs in any::<(bool, bool)>(),
+    ) {
+        let leg = |axis: usize, exponent: u32, negative: bool| {
+            let mut v = corner;
+            v[axis] += if negative { -(1 << exponent) } else { 1 << exponent };
+            v
+        };
+        let (first, second) = (axes % 3, (axes % 3 + 1 + axes / 3) % 3);
+        // Legs of one length, so that the slope of the third side is 1 as well.
+        let snapped = [corner, leg(first, exponent, signs.0), leg(second, exponent, signs.1)];
+        let triangle = snapped.map(|v| Vec3::from_array(v.map(|c| c as f32 / 16.0)));
+        let sides = DVec3::from_array(SIDES.map(f64::from));
+        let grid = VoxelGrid::covering(DVec3::ZERO, sides, 1.0, 1 << 28).expect("a legal grid");
+        let bits = [(); 2].map(|()| AtomicBits::new(grid.resolution()));
+        if let Some(triangle) = GridTriangle::new(&grid, triangle, 0.0).expect("finite") {
+            slices::scan(&triangle, &bits[0]);
+            triangle.scan_by_axes(|[i, j, k]| bits[1].insert_run(j, k, [i; 2]));
+        }
+        let exact = snapped.map(|v| v.map(|c| i128::from(c) * (UNIT / 16)));
+        let sets = bits.map(AtomicBits::into_set);
+        for voxel in grid.resolution().voxels() {
+            let expected = touches_exactly(&exact, voxel, 0);
+            prop_assert_eq!(sets[0].contains(voxel), expected, "slices: {:?}", voxel);
+            prop_assert_eq!(sets[1].contains(voxel), expected, "axes: {:?}", voxel);
         }
     }
 }
