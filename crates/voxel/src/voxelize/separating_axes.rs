@@ -83,8 +83,7 @@ impl Slab {
     /// The interval of centre coordinates along `self.axis` that the normal does not separate, for a column centred at
     /// `u`, `v` on the next two axes in cyclic order.
     ///
-    /// Errors and radius are both divided by the same coordinate of the normal, so the dilation covers the
-    /// rounding of the interval as it covers that of [`Slab::touches`].
+    /// Errors and radius are both divided by the same coordinate of the normal, so the dilation covers the rounding.
     #[inline]
     fn depths(&self, u: f64, v: f64) -> (f64, f64) {
         if !self.usable {
@@ -95,15 +94,6 @@ impl Slab {
         let (d0, d1) = ((self.low - dot) / self.n[self.axis], (self.high - dot) / self.n[self.axis]);
         (d0.min(d1), d0.max(d1))
     }
-
-    /// False if the normal separates the triangle from the voxel centred at these coordinates: on the next two axes
-    /// after `self.axis` in cyclic order, then on that axis.
-    #[inline]
-    fn touches(&self, u: f64, v: f64, w: f64) -> bool {
-        let n = |step: usize| self.n[(self.axis + step) % 3];
-        let dot = n(1) * u + n(2) * v + n(0) * w;
-        !self.usable || (self.low <= dot && dot <= self.high)
-    }
 }
 
 fn range(values: [f64; 3]) -> (f64, f64) {
@@ -113,8 +103,8 @@ fn range(values: [f64; 3]) -> (f64, f64) {
 
 /// Visits the voxels within bounds that touch a triangle, column by column along the dominant axis of its normal.
 ///
-/// A column that the projection of the triangle misses is skipped; the plane of the triangle bounds the run of voxels
-/// worth a test. Neither decides: every voxel that is visited has passed all axes but those of the box, which are the bounds.
+/// The bounds are the three axes of the box. A column that the projection of the triangle misses is skipped; the normal
+/// bounds the run of voxels in it, and only these are tested against the other two projections.
 pub(super) fn scan(vertices: &[DVec3; 3], bounds: &[[u32; 2]; 3], dilation: f64, mut visit: impl FnMut([u32; 3])) {
     let radius = 0.5 + dilation;
     let slab = Slab::new(vertices, radius);
@@ -140,7 +130,7 @@ pub(super) fn scan(vertices: &[DVec3; 3], bounds: &[[u32; 2]; 3], dilation: f64,
             }
             for cw in first as u32..=last as u32 {
                 let z = f64::from(cw) + 0.5;
-                if slab.touches(x, y, z) && along_u.touches(y, z) && along_v.touches(z, x) {
+                if along_u.touches(y, z) && along_v.touches(z, x) {
                     let mut voxel = [0; 3];
                     (voxel[u], voxel[v], voxel[w]) = (cu, cv, cw);
                     visit(voxel);
