@@ -6,9 +6,9 @@
 //!
 //! *Guarantee.* A voxel is in the set if its closed cube, dilated by 24u·(1 + M), meets the closed triangle of the
 //! converted vertices; that is what the rounding of end points and vertices requires. Both methods aim at the dilation
-//! δ of [`VoxelGrid::dilation`] and lose less than δ − 24u·(1 + M) to their own rounding. So no voxel is in the set that,
-//! dilated by 2δ, misses the triangle. Degenerate triangles are the segments or points that they are. A triangle in a common face of two voxels marks
-//! both. Both bounds are derived in `docs/numerics.md`.
+//! δ of [`VoxelGrid::dilation`] and lose less than δ − 24u·(1 + M) to their own rounding; no voxel is in the set that,
+//! dilated by 2δ, misses the triangle. Both bounds are derived in `docs/numerics.md`. Degenerate triangles are the segments
+//! or points that they are. A triangle in a common face of two voxels marks both.
 //!
 //! *Cost.* Parallel over triangles, with an atomic OR for each word; since OR commutes, the result does not depend on
 //! threads.
@@ -32,8 +32,8 @@ pub enum Voxelizer {
     /// Clips a triangle to slices and rows of the grid, and fills runs of voxels. The fastest.
     #[default]
     Slices,
-    /// Tests voxels one by one by 13 axes: the slow twin, about half as fast, with no step in common with the other but
-    /// the conversion to grid coordinates and the box of voxels around a triangle.
+    /// Tests voxels one by one by 13 axes: the slow twin, at a half to a quarter of the speed, with no step in common with the
+    /// other but the conversion to grid coordinates and the box of voxels around a triangle.
     SeparatingAxes,
 }
 

@@ -7,17 +7,19 @@
 //! *Definition.* For each slice k the polygon P = {p ∈ triangle: k − δ ≤ z ≤ k + 1 + δ}, seen along z; for each row j the
 //! interval I = {x of p ∈ P: j − δ ≤ y ≤ j + 1 + δ}; the run is {i: \[i − δ, i + 1 + δ\] ∩ I ≠ ∅}.
 //!
-//! This is the scheme of 3.5.1 in \[Houska2013\]: rasterize a projection conservatively, and in each pixel that is
-//! covered fill the run between the least and the greatest depth of the triangle. It departs in how it finds them. The thesis builds an offset
-//! polygon, whose pixels it then still has to cut the triangle's plane by; the clip gives pixel and depths together,
-//! the depths of the *triangle* and not of its plane. And the projection is always along x, not along the
-//! dominant axis of the normal, because runs along x are bits of one word. `docs/ARCHITECTURE.md` has the figures.
+//! This is the scheme of 3.5.1 in \[Houska2013\]: rasterize a projection of the triangle conservatively, and fill for each
+//! covered pixel the run between the least and the greatest depth of the triangle. It departs in how it finds them. The
+//! thesis tests the centres of pixels against an offset polygon \[Hasselgren2005\] cut into trapezoids, and then still
+//! needs depths; the clip gives pixels and depths together, and depths of the *triangle*, not of its plane. And
+//! the projection is always along x, not along the dominant axis of the normal, because runs along x are bits of
+//! words. `docs/ARCHITECTURE.md` compares both.
 //!
 //! *Guarantee.* That of [`super`]. Clipping only interpolates along edges, with weights in \[0, 1\]: it is as accurate for
 //! slivers, needles, segments and points as for any triangle, and cannot overflow. No normal is ever computed.
 //!
 //! *Cost.* One clip for each slice, up to six crossings; one for each row, usually four; one OR for each 64 voxels
-//! of a run. A triangle inside one voxel, or a straight row of them, needs no clip. So O(n²) for a triangle across n³ voxels, whatever its direction.
+//! of a run. So O(n²) for a triangle across n³ voxels, whatever its direction. A triangle inside one voxel, or inside
+//! a straight row of them, needs no clip.
 
 use glam::DVec3;
 
