@@ -21,17 +21,11 @@ impl VoxelGrid {
     /// A coordinate that is not finite gives the two opposite corners of the grid: the span about which least can be
     /// proved.
     ///
-    /// # Error of clipping
-    /// An emitter may be very far away, and rounding errors grow with its distance: no fixed dilation of the occluders
-    /// could cover them. So clipping is rounded outwards instead. With u = 2⁻⁵³ and G the largest of 1, the
-    /// resolution and the grid coordinates of the ends, let m = 128u·G.
-    /// - Computed coordinates P(τ) = a + τ·(b − a), τ in \[0, 1\], are within 16u·G of the true ones: 4u·G for a, the
-    ///   same for b, which with its own rounding gives 10u·G for b − a, and 2u·G for the evaluation.
-    /// - The segment is clipped to the grid dilated by m. A point of the true segment that is inside the grid has a τ
-    ///   at which the computed one is inside the dilated slab by at least 112u·G. The bounds of τ for that slab carry three
-    ///   roundings, less than 8u·G in position. So no such τ is ever clipped away, and `Outside` is certain.
-    /// - Each clipped end then moves by m away from the other end, on every axis. So the spanned cuboid contains the
-    ///   true part of the segment without the help of the dilation.
+    /// # Guarantee
+    /// Clipping is rounded outwards: ends are clipped to the grid enlarged by 128uG voxels and then move apart by as
+    /// much, with G the largest of 1, the resolution and the grid coordinates of the ends. So `Outside` is certain, and the
+    /// spanned cuboid holds the true part of the segment without the help of the dilation, however far away an end is.
+    /// `docs/numerics.md` has the derivation.
     #[must_use]
     #[inline]
     pub fn voxel_span(&self, a: DVec3, b: DVec3) -> Span {

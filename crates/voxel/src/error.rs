@@ -1,4 +1,6 @@
-//! What can be wrong with a grid or with the triangles to voxelize.
+//! What can be wrong with a grid, with the triangles to voxelize or with a set of voxels.
+
+use crate::{Resolution, Voxel};
 
 /// A grid or a set of triangles that cannot be used; each message says what to change.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -11,15 +13,15 @@ pub enum VoxelError {
     #[error("the bounds of the scene are empty: the minimum exceeds the maximum")]
     EmptyBounds,
     /// The voxel size is NaN, infinite, zero, negative or absurdly large.
-    #[error("the voxel size must be a positive finite number, not {size}")]
+    #[error("the voxel size must be a positive number of at most 1e60, not {size:?}")]
     InvalidVoxelSize {
         /// The size asked for.
         size: f64,
     },
     /// Voxels are so small that neighbouring single-precision coordinates are whole voxels apart.
     #[error(
-        "a voxel size of {size} is below the single-precision resolution of the scene's coordinates: \
-         the smallest usable voxel size is {smallest}"
+        "a voxel size of {size:?} is below the single-precision resolution of the scene's coordinates: \
+         the smallest usable voxel size is {smallest:?}"
     )]
     TooFine {
         /// The size asked for.
@@ -29,8 +31,8 @@ pub enum VoxelError {
     },
     /// The grid would have more voxels than allowed.
     #[error(
-        "a voxel size of {size} gives {voxels:.3e} voxels, more than the budget of {budget}: \
-         the smallest usable voxel size is {smallest}"
+        "a voxel size of {size:?} gives {voxels:.3e} voxels, more than the budget of {budget}: \
+         the smallest usable voxel size is {smallest:?}"
     )]
     TooManyVoxels {
         /// The size asked for.
@@ -45,4 +47,28 @@ pub enum VoxelError {
     /// A triangle has a vertex that is NaN or infinite.
     #[error("a triangle has a vertex that is not finite")]
     NonFiniteTriangle,
+    /// A set of voxels and a grid do not belong together.
+    #[error("the set has {set} voxels but the grid {grid}: voxelize the scene in this grid again")]
+    ResolutionMismatch {
+        /// The resolution of the set.
+        set: Resolution,
+        /// The resolution of the grid.
+        grid: Resolution,
+    },
+    /// A bit behind the last voxel of a row is set, where rows are padded to whole words.
+    #[error("the bit of voxel {voxel} is set, but the grid ends before it: the set is damaged, voxelize again")]
+    PaddingNotClear {
+        /// Where the voxel would be.
+        voxel: Voxel,
+    },
+    /// A triangle touches a voxel that is not in the set: proofs that rest on the set may be wrong.
+    #[error(
+        "triangle {triangle} touches voxel {voxel}, which is not occupied: the set is damaged or of other triangles"
+    )]
+    NotOccupied {
+        /// The number of the triangle, from 0.
+        triangle: usize,
+        /// The least such voxel.
+        voxel: Voxel,
+    },
 }

@@ -1,5 +1,7 @@
 //! The voxel grid (Def. 5 and 6 in \[Houska2013\]) and its typed coordinates.
 
+use std::fmt;
+
 use glam::DVec3;
 
 use crate::VoxelError;
@@ -29,6 +31,12 @@ impl Voxel {
     #[inline]
     pub const fn new(i: u32, j: u32, k: u32) -> Self {
         Self { i, j, k }
+    }
+}
+
+impl fmt::Display for Voxel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "({}, {}, {})", self.i, self.j, self.k)
     }
 }
 
@@ -83,6 +91,12 @@ impl Resolution {
     /// All voxels in the order of their linear coordinates.
     pub fn voxels(self) -> impl Iterator<Item = Voxel> {
         (0..self.z).flat_map(move |k| (0..self.y).flat_map(move |j| (0..self.x).map(move |i| Voxel::new(i, j, k))))
+    }
+}
+
+impl fmt::Display for Resolution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} × {} × {}", self.x, self.y, self.z)
     }
 }
 
@@ -194,20 +208,9 @@ impl VoxelGrid {
 
     /// δ, in voxels: voxelization treats a voxel as if it were larger by δ on each side.
     ///
-    /// δ = 2⁻⁴⁷·(1 + (|x|max + |o|max) / s), which is 64·u·(1 + M) with the unit roundoff u = 2⁻⁵³. What it covers,
-    /// with grid coordinates g = (p − o)/s of magnitude at most M + 1:
-    ///
-    /// - *End points.* The computed t = fl(fl(p − o)·fl(1/s)) has three roundings: |t − g| ≤ γ₃·|g| < 4u·(M + 1). The
-    ///   clamp at the greatest faces adds at most 16u·X ≤ 16u·(M + 1). So the true segment lies in the cuboid of its
-    ///   voxels dilated by 20u·(M + 1), and a triangle that it meets meets a *voxel* of the cuboid so dilated.
-    /// - *Vertices.* The same conversion moves each vertex, so each point of the triangle, by less than 4u·(M + 1).
-    /// - *The test.* On any axis a, computed in whatever way, a projection a·x is off by at most γ₃·|a|₁·(M + 1), and
-    ///   the dilated voxel's radius is (½ + δ)·|a|₁. So the errors of both projections, of the radius and of
-    ///   its additions are worth less than 16u·(M + 1) of dilation, whatever the axis. (That the axis itself is
-    ///   inexact does not matter: any axis that separates, separates.)
-    ///
-    /// The sum is 40u·(M + 1), below 64u·(M + 1). Clipping needs nothing of this budget; see [`VoxelGrid::voxel_span`].
-    /// The reference intersector neither: it is exact, so nothing is hit at a distance.
+    /// δ = 2⁻⁴⁷·(1 + M), which is 64·u·(1 + M) with the unit roundoff u = 2⁻⁵³ and M = (|x|max + |o|max) / s, the bound of
+    /// grid coordinates. It covers the rounding of end points (20u·(1 + M)), of vertices (4u·(1 + M)) and
+    /// of the voxelization itself (the rest). `docs/numerics.md` has the derivation.
     ///
     /// Because a voxel spans at least four `f32` steps, M ≤ 2²³ and δ ≤ 2⁻²³ voxels: proofs lose next to nothing.
     #[must_use]

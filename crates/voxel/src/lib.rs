@@ -8,14 +8,15 @@
 //! > then the segment touches no triangle; not in the limit of good arithmetic, but for the very `f32` vertices and
 //! > `f64` end points that were passed.
 //!
-//! The error budget behind it is derived at [`VoxelGrid::dilation`]. Definitions are those of \[Houska2013\], chapter 3.
+//! [`VoxelSet::validate`] checks a set against its triangles. The error budget behind the promise, [`VoxelGrid::dilation`],
+//! is derived in `docs/numerics.md`. Definitions are those of \[Houska2013\], chapter 3.
 
 mod clip;
 mod error;
 mod export;
 mod grid;
-mod sat;
 mod set;
+mod validate;
 mod voxelize;
 
 pub use clip::Span;
@@ -23,4 +24,4 @@ pub use error::VoxelError;
 pub use export::{write_indices, write_obj};
 pub use grid::{Resolution, Voxel, VoxelGrid};
 pub use set::VoxelSet;
-pub use voxelize::voxelize;
+pub use voxelize::{Voxelizer, voxelize, voxelize_with};

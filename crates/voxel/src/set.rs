@@ -136,7 +136,7 @@ pub(crate) fn bit_address(resolution: Resolution, words_per_row: usize, voxel: V
 }
 
 /// The bits of a row's last word that stand for voxels.
-fn padding_mask(resolution: Resolution) -> u64 {
+pub(crate) fn padding_mask(resolution: Resolution) -> u64 {
     match resolution.x % 64 {
         0 => u64::MAX,
         used => (1 << used) - 1,

@@ -65,6 +65,27 @@ fn coordinates_that_are_not_finite_span_everything() {
     }
 }
 
+/// Points one step below a face, whose grid coordinates round to the face: fl(1/5) > 1/5. Without moving the ends
+/// outwards the voxel that truly holds the segment would be left out.
+#[test]
+fn ends_are_rounded_outwards() {
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(50.0), 5.0, 1 << 20).expect("a legal grid");
+    let mut rounded_to_the_face = 0;
+    for face in 1..10u32 {
+        let y = f64::from(5 * face);
+        let (below, above) = (y.next_down(), y.next_up());
+        rounded_to_the_face += u32::from(grid.grid_coordinates(DVec3::splat(below)).y == f64::from(face));
+        // Along the face; through it, downwards and upwards, with the middle in the grid.
+        for (ya, yb) in [(below, below), (above, below), (below, above)] {
+            let Span::Inside(from, to) = grid.voxel_span(v(-1e4, ya, 7.0), v(1e4, yb, 7.0)) else {
+                panic!("the segment meets the grid")
+            };
+            assert!((from.j.min(to.j)..=from.j.max(to.j)).contains(&(face - 1)), "{ya} {yb}");
+        }
+    }
+    assert!(rounded_to_the_face > 0, "the test is about rounding");
+}
+
 /// Coordinates near and on faces of voxels and of the grid, and far away.
 fn coordinate() -> impl Strategy<Value = f64> {
     let step = prop_oneof![Just(0i8), -1i8..=1];

@@ -1,6 +1,9 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::Voxel;
+
+const VOXELIZERS: [Voxelizer; 2] = [Voxelizer::Slices, Voxelizer::SeparatingAxes];
 
 /// Units per voxel of the exact oracle: vertices are snapped to 1/16 voxel, dilations to 1/256.
 const UNIT: i128 = 512;
@@ -28,6 +31,10 @@ fn touches_exactly(vertices: &[[i128; 3]; 3], voxel: Voxel, dilation: i128) -> b
 
 /// A grid of voxels of size 1 whose origin is `offset`, and the set of triangles given in 1/16 voxel.
 fn voxelize_snapped(resolution: [i32; 3], offset: f64, triangles: &[[[i32; 3]; 3]]) -> VoxelSet {
+    snapped_with(Voxelizer::default(), resolution, offset, triangles)
+}
+
+fn snapped_with(voxelizer: Voxelizer, resolution: [i32; 3], offset: f64, triangles: &[[[i32; 3]; 3]]) -> VoxelSet {
     let extent = DVec3::from_array(resolution.map(f64::from));
     let grid = VoxelGrid::covering(DVec3::splat(offset), extent + offset, 1.0, 1 << 28).expect("a legal grid");
     let world = |c: i32| {
@@ -36,16 +43,19 @@ fn voxelize_snapped(resolution: [i32; 3], offset: f64, triangles: &[[[i32; 3]; 3
         exact as f32
     };
     let triangles: Vec<_> = triangles.iter().map(|t| t.map(|v| Vec3::from_array(v.map(world)))).collect();
-    voxelize(&grid, triangles).expect("finite vertices")
+    voxelize_with(voxelizer, &grid, triangles).expect("finite vertices")
 }
 
 fn check(resolution: [i32; 3], offset: f64, triangle: [[i32; 3]; 3]) -> Result<(), TestCaseError> {
-    let set = voxelize_snapped(resolution, offset, &[triangle]);
+    let sets = VOXELIZERS.map(|voxelizer| (voxelizer, snapped_with(voxelizer, resolution, offset, &[triangle])));
     let exact = triangle.map(|v| v.map(|c| i128::from(c) * (UNIT / 16)));
-    for voxel in set.resolution().voxels() {
-        let found = set.contains(voxel);
-        prop_assert!(found || !touches_exactly(&exact, voxel, 0), "{voxel:?} is missing for {triangle:?}");
-        prop_assert!(!found || touches_exactly(&exact, voxel, 2), "{voxel:?} is too much for {triangle:?}");
+    for voxel in sets[0].1.resolution().voxels() {
+        let (touches, nearly) = (touches_exactly(&exact, voxel, 0), touches_exactly(&exact, voxel, 2));
+        for (voxelizer, set) in &sets {
+            let found = set.contains(voxel);
+            prop_assert!(found || !touches, "{voxelizer:?}: {voxel:?} is missing for {triangle:?}");
+            prop_assert!(!found || nearly, "{voxelizer:?}: {voxel:?} is too much for {triangle:?}");
+        }
     }
     Ok(())
 }
@@ -117,47 +127,65 @@ proptest! {
     ) {
         let origin = DVec3::from_array(origin.map(f64::from));
         let grid = VoxelGrid::covering(origin, DVec3::splat(42.0), size, 1 << 30).expect("a legal grid");
-        let set = voxelize(&grid, vec![vertices.map(|v| Vec3::from_array(v.map(|c| c as f32)))]).expect("finite");
         let [a, b, c] = vertices.map(|v| DVec3::from_array(v.map(f64::from)));
-        for point in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (2.0 * a + b + c) / 4.0] {
-            let voxel = grid.voxel_containing(point).expect("inside");
-            prop_assert!(set.contains(voxel), "{point} in {voxel:?}");
+        for voxelizer in VOXELIZERS {
+            let triangle = vertices.map(|v| Vec3::from_array(v.map(|c| c as f32)));
+            let set = voxelize_with(voxelizer, &grid, vec![triangle]).expect("finite");
+            for point in [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (2.0 * a + b + c) / 4.0] {
+                let voxel = grid.voxel_containing(point).expect("inside");
+                prop_assert!(set.contains(voxel), "{voxelizer:?}: {point} in {voxel:?}");
+            }
         }
     }
-}
 
-#[test]
-fn triangle_in_a_face_marks_both_sides() {
-    for axis in 0..3 {
-        let mut triangle = [[40, 40, 40], [72, 40, 40], [40, 72, 40]].map(|mut v: [i32; 3]| {
-            v.rotate_right(axis);
+    /// Vertices far outside the grid round by more than the grid's own dilation. The middle of an edge is known exactly.
+    #[test]
+    fn points_of_triangles_that_reach_far(
+        size in prop::sample::select(vec![3.0, 7.0, 0.7]),
+        middle in prop::array::uniform3((0..=13i32).prop_map(|c| 3 * c)),
+        direction in prop::array::uniform3(-(1 << 23)..1 << 23i32),
+        third in prop::array::uniform3(-(1 << 23)..1 << 23i32),
+    ) {
+        let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(42.0), size, 1 << 30).expect("a legal grid");
+        let end = |sign: i32| Vec3::from_array([0, 1, 2].map(|axis| (middle[axis] + sign * direction[axis]) as f32));
+        let triangle = [end(1), end(-1), Vec3::from_array(third.map(|c| c as f32))];
+        let voxel = grid.voxel_containing(DVec3::from_array(middle.map(f64::from))).expect("inside");
+        for voxelizer in VOXELIZERS {
+            let set = voxelize_with(voxelizer, &grid, vec![triangle]).expect("finite");
+            prop_assert!(set.contains(voxel), "{voxelizer:?}: {middle:?} in {voxel:?}");
+        }
+    }
+
+    /// Closed to the last bit: right-angled triangles whose legs are powers of two along axes, where nothing rounds,
+    /// without any dilation.
+    #[test]
+    fn equals_the_exact_test_without_dilation_where_nothing_rounds(
+        corner in vertex(), axes in 0..6usize, exponent in 0..8u32, signs in any::<(bool, bool)>(),
+    ) {
+        let leg = |axis: usize, exponent: u32, negative: bool| {
+            let mut v = corner;
+            v[axis] += if negative { -(1 << exponent) } else { 1 << exponent };
             v
-        });
-        for v in &mut triangle {
-            v[(axis + 2) % 3] = 48;
+        };
+        let (first, second) = (axes % 3, (axes % 3 + 1 + axes / 3) % 3);
+        // Legs of one length, so that the slope of the third side is 1 as well.
+        let snapped = [corner, leg(first, exponent, signs.0), leg(second, exponent, signs.1)];
+        let triangle = snapped.map(|v| Vec3::from_array(v.map(|c| c as f32 / 16.0)));
+        let sides = DVec3::from_array(SIDES.map(f64::from));
+        let grid = VoxelGrid::covering(DVec3::ZERO, sides, 1.0, 1 << 28).expect("a legal grid");
+        let bits = [(); 2].map(|()| AtomicBits::new(grid.resolution()));
+        if let Some(triangle) = GridTriangle::new(&grid, triangle, 0.0).expect("finite") {
+            slices::scan(&triangle, &bits[0]);
+            triangle.scan_by_axes(|[i, j, k]| bits[1].insert_run(j, k, [i; 2]));
         }
-        let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
-        let normal = (axis + 2) % 3;
-        let layers: std::collections::BTreeSet<_> = set.iter().map(|v| [v.i, v.j, v.k][normal]).collect();
-        assert_eq!(layers.into_iter().collect::<Vec<_>>(), [2, 3]);
+        let exact = snapped.map(|v| v.map(|c| i128::from(c) * (UNIT / 16)));
+        let sets = bits.map(AtomicBits::into_set);
+        for voxel in grid.resolution().voxels() {
+            let expected = touches_exactly(&exact, voxel, 0);
+            prop_assert_eq!(sets[0].contains(voxel), expected, "slices: {:?}", voxel);
+            prop_assert_eq!(sets[1].contains(voxel), expected, "axes: {:?}", voxel);
+        }
     }
-}
-
-#[test]
-fn point_on_a_corner_marks_eight_voxels() {
-    assert_eq!(voxelize_snapped([8, 8, 8], 0.0, &[[[32, 48, 64]; 3]]).count(), 8);
-    assert_eq!(voxelize_snapped([8, 8, 8], 0.0, &[[[0, 0, 0]; 3]]).count(), 1);
-}
-
-#[test]
-fn triangles_on_the_greatest_face_mark_the_last_layer() {
-    let triangle = [[0, 0, 128], [128, 0, 128], [0, 128, 128]];
-    let set = voxelize_snapped([8, 8, 8], 0.0, &[triangle]);
-    assert!(!set.is_empty() && set.iter().all(|v| v.k == 7));
-    // A bound that is no whole number of voxels, met exactly.
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(0.3f32.into()), 0.1, 1 << 20).expect("a legal grid");
-    let set = voxelize(&grid, vec![[Vec3::splat(0.3); 3]]).expect("finite");
-    assert!(set.contains(grid.voxel_containing(DVec3::splat(0.3f32.into())).expect("inside")));
 }
 
 #[test]
@@ -182,33 +210,17 @@ fn tiny_and_needle_triangles_do_not_vanish() {
     assert!(across_zero.contains(Voxel::new(0, 4, 4)));
 }
 
+/// The same set from one thread and from many, for every method, although threads race for the words.
 #[test]
-fn vertices_that_are_not_finite_are_errors() {
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(8.0), 1.0, 1 << 20).expect("a legal grid");
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let result = voxelize(&grid, vec![[Vec3::ONE; 3], [Vec3::ZERO, Vec3::ONE, Vec3::new(0.0, bad, 0.0)]]);
-        assert_eq!(result, Err(VoxelError::NonFiniteTriangle));
-    }
-    let far = voxelize(&grid, vec![[Vec3::splat(f32::MAX), Vec3::splat(f32::MIN), Vec3::new(f32::MAX, 0.0, 0.0)]]);
-    assert!(far.is_ok_and(|set| (0..8).all(|i| set.contains(Voxel::new(i, i, i)))));
-}
-
-/// Prints the speed of the fast path and of medium triangles: `cargo test --release -p vdf-voxel -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn speed() {
-    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(256.0), 1.0, 1 << 24).expect("a legal grid");
-    for size in [0.3f32, 3.0, 30.0] {
-        let count = 2_000_000 / (size * size).max(1.0) as usize;
-        let triangles: Vec<_> = (0..count)
-            .map(|n| {
-                let corner = Vec3::new((n * 37 % 2200) as f32, (n * 101 % 2210) as f32, (n * 53 % 2230) as f32) * 0.1;
-                [corner, corner + Vec3::new(size, 0.2 * size, 0.1), corner + Vec3::new(0.1, size, 0.7 * size)]
-            })
-            .collect();
-        let start = std::time::Instant::now();
-        let set = voxelize(&grid, triangles).expect("finite");
-        let seconds = start.elapsed().as_secs_f64();
-        println!("size {size}: {:.2} M triangles/s, {} voxels", count as f64 / seconds * 1e-6, set.count());
+fn threads_do_not_matter() {
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(20.0), 0.3, 1 << 20).expect("a legal grid");
+    let vertex = |n: u32| Vec3::new((n * 37 % 199) as f32, (n * 101 % 193) as f32, (n * 53 % 197) as f32) * 0.1;
+    let triangles: Vec<_> = (0..2000u32).map(|n| [vertex(3 * n), vertex(3 * n + 1), vertex(n)]).collect();
+    for voxelizer in VOXELIZERS {
+        let sets = [1, 2, 7].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| voxelize_with(voxelizer, &grid, triangles.clone()).expect("finite vertices"))
+        });
+        assert!(sets.iter().all(|set| *set == sets[0]), "{voxelizer:?}");
     }
 }
