@@ -17,6 +17,11 @@ pub(crate) enum Failure {
     Work(anyhow::Error),
     /// The user interrupted: exit code 130.
     Interrupted,
+    /// The user interrupted after some of the files had been written: exit code 130.
+    InterruptedAfter {
+        /// Files that were written, each of them whole.
+        written: usize,
+    },
 }
 
 impl Failure {
@@ -35,7 +40,11 @@ impl Failure {
                 say(format_args!("error: {e:#}"));
                 ExitCode::from(1)
             }
-            Self::Interrupted => {
+            Self::InterruptedAfter { written } if *written > 0 => {
+                say(format_args!("interrupted; only the files listed above were written"));
+                ExitCode::from(130)
+            }
+            Self::Interrupted | Self::InterruptedAfter { .. } => {
                 say(format_args!("interrupted; nothing was written"));
                 ExitCode::from(130)
             }
