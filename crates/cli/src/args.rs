@@ -90,7 +90,7 @@ pub(crate) enum SceneCommand {
     /// Write a built-in scene and its meshes, to edit it or to load it in Mitsuba 3
     #[command(after_help = "Examples:
   vdf scene write cbox_vol2 my-scene                      a scene to start from
-  vdf scene write san-miguel court --triangles 10000000   a generated scene in another size (0.9 GB)")]
+  vdf scene write san-miguel court --triangles 10000000   a generated scene in another size (0.7 GB)")]
     Write {
         /// Name of the scene
         name: String,

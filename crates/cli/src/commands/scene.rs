@@ -73,18 +73,20 @@ impl SceneFile<'_> {
 fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Result<(), Failure> {
     // It only listens for Ctrl-C: large files take a while, and an unfinished one must not stay behind.
     let reporter = Reporter::new(true)?;
-    for (written, file) in files.enumerate() {
+    let mut written = 0;
+    for file in files {
         let path = folder.join(file.path());
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent)
             .with_context(|| format!("cannot make the folder {}", parent.display()))
             .map_err(Failure::Work)?;
         let result = write_atomically(&path, |out| file.write(&mut Interruptible { out, reporter: &reporter }));
-        if reporter.interrupted() {
-            return Err(Failure::InterruptedAfter { written: written + usize::from(result.is_ok()) });
+        if result.is_err() && reporter.interrupted() {
+            return Err(Failure::InterruptedAfter { written });
         }
         result.with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
         writeln!(io::stdout(), "{}", path.display())?;
+        written += 1;
     }
     Ok(())
 }

@@ -109,6 +109,9 @@ mod tests {
         let a = obj.vertex(DVec3::new(-12.345_67, 0.0, 1e-9)).unwrap();
         let b = obj.vertex(DVec3::new(0.5, -0.000_06, 1024.0)).unwrap();
         obj.triangle([a, b, 120]).unwrap();
-        assert_eq!(String::from_utf8(text).unwrap(), "v -12.3457 0.0000 0.0000\nv 0.5000 -0.0001 1024.0000\nf 1 2 120\n");
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "v -12.3457 0.0000 0.0000\nv 0.5000 -0.0001 1024.0000\nf 1 2 120\n"
+        );
     }
 }

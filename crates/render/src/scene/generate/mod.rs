@@ -66,7 +66,7 @@ impl GeneratedScene {
     /// The most triangles that a generated scene can have.
     pub const MAX_TRIANGLES: u32 = 10_000_000;
 
-    /// The scene with about so many triangles (within 2 %).
+    /// The scene with about so many triangles (within 0.5 %).
     ///
     /// # Errors
     /// If they are fewer than [`Self::MIN_TRIANGLES`] or more than [`Self::MAX_TRIANGLES`].

@@ -59,12 +59,7 @@ pub(super) fn quad(sink: &mut dyn MeshSink, [a, b, c, d]: [u32; 4]) -> io::Resul
 
 /// The surface of revolution of `profile`, pairs of radius and height from the bottom to the top, about the vertical axis. A radius
 /// of 0 at an end closes it with a tip.
-pub(super) fn lathe(
-    sink: &mut dyn MeshSink,
-    at: &Placement,
-    profile: &[[f64; 2]],
-    segments: u32,
-) -> io::Result<()> {
+pub(super) fn lathe(sink: &mut dyn MeshSink, at: &Placement, profile: &[[f64; 2]], segments: u32) -> io::Result<()> {
     let mut below: Vec<u32> = Vec::new();
     for &[radius, height] in profile {
         let count = if radius == 0.0 { 1 } else { segments };
@@ -97,12 +92,7 @@ pub(super) fn band(sink: &mut dyn MeshSink, below: &[u32], above: &[u32]) -> io:
 }
 
 /// An open cone from `from` to `to`.
-pub(super) fn tube(
-    sink: &mut dyn MeshSink,
-    [from, to]: [DVec3; 2],
-    radii: [f64; 2],
-    segments: u32,
-) -> io::Result<()> {
+pub(super) fn tube(sink: &mut dyn MeshSink, [from, to]: [DVec3; 2], radii: [f64; 2], segments: u32) -> io::Result<()> {
     let axis = (to - from).normalize();
     let helper = if axis.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };
     let u = axis.cross(helper).normalize();

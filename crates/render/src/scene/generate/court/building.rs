@@ -29,8 +29,7 @@ pub(super) fn plaster(triangles: u32, sink: &mut dyn MeshSink) -> io::Result<()>
     for side in sides() {
         let Side { at, distance: d, half, .. } = side;
         // The long sides reach round the corners, the short ones fit between them.
-        let (floor, wall) =
-            if side.long { (half + DEPTH, half + DEPTH + 0.2) } else { (half - 0.3, half + DEPTH) };
+        let (floor, wall) = if side.long { (half + DEPTH, half + DEPTH + 0.2) } else { (half - 0.3, half + DEPTH) };
         cuboid(sink, &at, [-wall, -0.1, d + DEPTH], [wall, 12.3, d + DEPTH + 0.2])?;
         cuboid(sink, &at, [-floor, UPPER - 0.3, d - 0.3], [floor, UPPER, d + DEPTH])?;
         cuboid(sink, &at, [-floor, CEILING, d - 0.3], [floor, CEILING + 0.1, d + DEPTH])?;

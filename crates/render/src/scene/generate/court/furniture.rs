@@ -4,17 +4,17 @@ use std::io;
 
 use glam::DVec3;
 
-use super::{DEPTH, Detail, UPPER, plants, sides};
+use super::{DEPTH, Detail, HALF, UPPER, plants, sides};
 use crate::scene::generate::{
     mesh::MeshSink,
     random::Random,
-    shapes::{Placement, cuboid, lathe},
+    shapes::{Placement, cuboid, lathe, tube},
 };
 
 const TABLE_STREAM: u64 = 0x02;
 
 /// Where the fountain stands.
-const FOUNTAIN: [f64; 2] = [-18.0, 0.5];
+const FOUNTAIN: [f64; 2] = [-14.0, 0.8];
 const BASIN: [[f64; 2]; 8] =
     [[2.5, 0.0], [2.5, 0.15], [2.2, 0.25], [2.25, 0.7], [2.45, 0.75], [2.45, 0.85], [2.1, 0.85], [2.05, 0.35]];
 const BOWLS: [[f64; 2]; 13] = [
@@ -71,6 +71,9 @@ pub(super) fn wood(triangles: u32, sink: &mut dyn MeshSink) -> io::Result<()> {
     for (number, [x, z]) in (0..).zip(table_places()) {
         table_with_chairs(sink, [x, z], number, detail)?;
     }
+    for x in CORDS {
+        cord(sink, x, detail)?;
+    }
     plants::branches(sink, detail)
 }
 
@@ -89,6 +92,27 @@ const LANTERN: [[f64; 2]; 6] = [[0.0, 3.55], [0.1, 3.6], [0.2, 3.95], [0.24, 3.9
 
 fn lantern(sink: &mut dyn MeshSink, at: &Placement, detail: Detail) -> io::Result<()> {
     lathe(sink, at, &LANTERN, detail.parts(4))
+}
+
+/// Where cords are hung across the court, from balustrade to balustrade.
+const CORDS: [f64; 5] = [-26.0, -18.0, 12.0, 18.0, 25.0];
+const PAPER_LANTERN: [[f64; 2]; 6] = [[0.0, -0.5], [0.12, -0.48], [0.2, -0.3], [0.12, -0.12], [0.03, -0.1], [0.0, 0.0]];
+
+/// A sagging cord with lanterns.
+fn cord(sink: &mut dyn MeshSink, x: f64, detail: Detail) -> io::Result<()> {
+    let pieces = 18;
+    let place = |i: u32| {
+        let t = 2.0 * f64::from(i) / f64::from(pieces) - 1.0;
+        DVec3::new(x + 1.5 * t, UPPER + 0.9 - 1.5 * (1.0 - t * t), (HALF[1] - 0.12) * t)
+    };
+    for i in 0..pieces {
+        tube(sink, [place(i), place(i + 1)], [0.015, 0.015], 3)?;
+        if i % 2 == 1 {
+            let [x, y, z] = place(i).to_array();
+            lathe(sink, &Placement::at(x, y, z), &PAPER_LANTERN, detail.parts(5))?;
+        }
+    }
+    Ok(())
 }
 
 fn bench(sink: &mut dyn MeshSink, at: &Placement) -> io::Result<()> {

@@ -17,7 +17,7 @@ const CLUMP_STREAM: u64 = 0x04;
 const LEAF_STREAM: u64 = 0x05;
 
 /// All leaves together have this area, however many there are.
-const LEAF_AREA: f64 = 1500.0;
+const LEAF_AREA: f64 = 1800.0;
 
 /// One piece of a trunk or a branch.
 struct Limb {
@@ -47,10 +47,10 @@ struct Habit {
 const TREES: [Habit; 3] = [
     Habit {
         foot: DVec3::new(0.0, 0.3, 0.0),
-        lengths: &[3.6, 4.6, 3.0, 1.9],
+        lengths: &[3.6, 5.2, 3.4, 2.1],
         children: &[10, 4, 4],
         trunk_radius: 0.65,
-        clump_radius: 1.2,
+        clump_radius: 1.3,
     },
     Habit {
         foot: DVec3::new(23.0, 0.0, -1.0),

@@ -4,9 +4,8 @@ use std::io;
 
 use glam::DVec3;
 
-use super::{FIXED, terrain};
+use super::terrain;
 use crate::scene::generate::{
-    count,
     mesh::MeshSink,
     random::{Random, circle, noise},
     shapes::tube,
@@ -44,7 +43,12 @@ fn conifers() -> Vec<Conifer> {
             continue;
         }
         let height = random.between(0.7, 1.6);
-        trees.push(Conifer { foot: DVec3::new(x, y - 0.05, z), height, radius: height * random.between(0.2, 0.28), number });
+        trees.push(Conifer {
+            foot: DVec3::new(x, y - 0.05, z),
+            height,
+            radius: height * random.between(0.2, 0.28),
+            number,
+        });
         if trees.len() == TREES {
             break;
         }
@@ -63,8 +67,9 @@ pub(super) fn bark(_: u32, sink: &mut dyn MeshSink) -> io::Result<()> {
 
 /// Skirts of needles: a tree has more and finer ones the more triangles are left for it.
 pub(super) fn needles(triangles: u32, sink: &mut dyn MeshSink) -> io::Result<()> {
-    let mut left = f64::from(triangles.saturating_sub(count(&FIXED, triangles)?));
     let trees = conifers();
+    let others = terrain::count(triangles) + 2 * TRUNK_SEGMENTS * trees.len() as u32;
+    let mut left = f64::from(triangles.saturating_sub(others));
     for (i, tree) in trees.iter().enumerate() {
         let share = left / (trees.len() - i) as f64;
         let layers = ((share / 3.0).sqrt() as u32).clamp(3, 18);

@@ -32,10 +32,10 @@ pub(super) fn height(x: f64, z: f64) -> f64 {
     let axis = 3.0 * noise(0.7, z * 0.06, HILL_STREAM) + 0.12 * z;
     let beside = fade(((x - axis).abs() - 3.5) / 17.0);
     let behind = fade((2.0 - z) / 25.0);
-    let rise = 1.0 - (1.0 - beside) * (1.0 - 0.85 * behind);
+    let rise = 1.0 - (1.0 - 0.6 * beside) * (1.0 - 0.9 * behind);
     // The hill of the camera.
     let hill = fade(1.0 - ((x - 1.0).abs() + (z - 21.0).abs()) / 9.0);
-    1.5 * hills - 0.9 + rise * (1.5 + 22.0 * ridges(x * 0.055, z * 0.055)) + 3.2 * hill
+    1.5 * hills - 0.9 + rise * (1.5 + 22.0 * ridges(x * 0.055, z * 0.055)) + 5.0 * hill
 }
 
 /// Sum of octaves, mostly within ±1.
@@ -79,9 +79,9 @@ fn cover([a, b, c]: [DVec3; 3]) -> Cover {
     let centre = (a + b + c) / 3.0;
     let upright = (b - a).cross(c - a).normalize().y;
     let patch = fractal(centre.x * 0.3, centre.z * 0.3, COVER_STREAM);
-    if centre.y + 1.5 * patch > 9.5 && upright > 0.5 {
+    if centre.y + 1.5 * patch > 8.0 && upright > 0.42 {
         Cover::Snow
-    } else if upright < 0.72 + 0.08 * patch || centre.y + 1.2 * patch > 7.5 {
+    } else if upright < 0.72 + 0.08 * patch || centre.y + 1.2 * patch > 6.5 {
         Cover::Rock
     } else {
         Cover::Grass
@@ -95,13 +95,27 @@ pub(super) fn grass(triangles: u32, sink: &mut dyn MeshSink) -> io::Result<()> {
 /// Bare ground and boulders.
 pub(super) fn rock(triangles: u32, sink: &mut dyn MeshSink) -> io::Result<()> {
     ground(triangles, Cover::Rock, sink)?;
-    let share = BOULDER_SHARE * f64::from(triangles) / f64::from(BOULDERS);
-    // A boulder has 2·s·(s/2 − 1) triangles.
-    let segments = 2 * ((share.sqrt() / 2.0) as u32) + 2;
     for number in 0..BOULDERS {
-        boulder(sink, number, segments)?;
+        boulder(sink, number, boulder_segments(triangles))?;
     }
     Ok(())
+}
+
+/// Cells of the height field along x and along z.
+fn cells(triangles: u32) -> u32 {
+    (GROUND_SHARE * f64::from(triangles) / 2.0).sqrt() as u32
+}
+
+/// An even number s; a boulder has s·(s − 2) triangles.
+fn boulder_segments(triangles: u32) -> u32 {
+    let share = BOULDER_SHARE * f64::from(triangles) / f64::from(BOULDERS);
+    2 * ((share.sqrt() / 2.0) as u32) + 2
+}
+
+/// How many triangles ground and boulders have in a scene of so many.
+pub(super) fn count(triangles: u32) -> u32 {
+    let (cells, segments) = (cells(triangles), boulder_segments(triangles));
+    2 * cells * cells + BOULDERS * segments * (segments - 2)
 }
 
 pub(super) fn snow(triangles: u32, sink: &mut dyn MeshSink) -> io::Result<()> {
@@ -121,7 +135,7 @@ struct Node {
 
 /// The part of the ground with this cover, row by row.
 fn ground(triangles: u32, wanted: Cover, sink: &mut dyn MeshSink) -> io::Result<()> {
-    let cells = (GROUND_SHARE * f64::from(triangles) / 2.0).sqrt() as u32;
+    let cells = cells(triangles);
     let coordinate = |i: u32| HALF * (2.0 * f64::from(i) / f64::from(cells) - 1.0);
     let row = |k: u32| -> Vec<Node> {
         let z = coordinate(k);
