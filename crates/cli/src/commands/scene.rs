@@ -73,8 +73,7 @@ impl SceneFile<'_> {
 fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Result<(), Failure> {
     // It only listens for Ctrl-C: large files take a while, and an unfinished one must not stay behind.
     let reporter = Reporter::new(true)?;
-    let mut written = 0;
-    for file in files {
+    for (written, file) in files.enumerate() {
         let path = folder.join(file.path());
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent)
@@ -86,7 +85,6 @@ fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Resul
         }
         result.with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
         writeln!(io::stdout(), "{}", path.display())?;
-        written += 1;
     }
     Ok(())
 }
