@@ -94,12 +94,18 @@ pub(crate) enum SceneCommand {
     /// List the built-in scenes
     List,
     /// Write a built-in scene and its meshes, to edit it or to load it in Mitsuba 3
+    #[command(after_help = "Examples:
+  vdf scene write cbox_vol2 my-scene                      a scene to start from
+  vdf scene write san-miguel court --triangles 10000000   a generated scene in another size (0.7 GB)")]
     Write {
         /// Name of the scene
         name: String,
         /// Folder to write to; made if it does not exist
         #[arg(default_value = ".")]
         folder: PathBuf,
+        /// About how many triangles a generated scene gets, from 100000 to 10000000
+        #[arg(long, value_name = "N")]
+        triangles: Option<u32>,
     },
 }
 

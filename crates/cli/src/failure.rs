@@ -17,8 +17,11 @@ pub(crate) enum Failure {
     Work(anyhow::Error),
     /// The user interrupted: exit code 130.
     Interrupted,
-    /// The same, after so many files were written whole.
-    InterruptedAfter(usize),
+    /// The user interrupted after some of the files had been written: exit code 130.
+    InterruptedAfter {
+        /// Files that were written, each of them whole.
+        written: usize,
+    },
 }
 
 impl Failure {
@@ -37,12 +40,12 @@ impl Failure {
                 say(format_args!("error: {e:#}"));
                 ExitCode::from(1)
             }
-            Self::Interrupted => {
-                say(format_args!("interrupted; nothing was written"));
+            Self::InterruptedAfter { written } if *written > 0 => {
+                say(format_args!("interrupted; {written} files were written, each of them whole"));
                 ExitCode::from(130)
             }
-            Self::InterruptedAfter(files) => {
-                say(format_args!("interrupted; {files} files were written"));
+            Self::Interrupted | Self::InterruptedAfter { .. } => {
+                say(format_args!("interrupted; nothing was written"));
                 ExitCode::from(130)
             }
         }

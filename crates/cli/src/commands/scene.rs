@@ -1,41 +1,110 @@
 //! `vdf scene`.
 
-use std::{io::Write as _, path::Path};
+use std::{
+    io::{self, Write},
+    path::Path,
+};
 
 use anyhow::{Context as _, anyhow};
 use vdf_render::{
-    scene::{builtin, builtin_names},
+    RenderError,
+    scene::{EmbeddedFile, GeneratedFile, builtin, builtin_names, generated},
     write_atomically,
 };
 
-use crate::{args::SceneCommand, failure::Failure};
+use crate::{args::SceneCommand, failure::Failure, progress::Reporter};
 
 pub(crate) fn run(command: &SceneCommand) -> Result<(), Failure> {
     match command {
-        SceneCommand::List => {
-            for name in builtin_names() {
-                writeln!(std::io::stdout(), "{name}")?;
+        SceneCommand::List => list(),
+        SceneCommand::Write { name, folder, triangles } => match generated(name) {
+            Some(scene) => {
+                let scene = triangles.map_or(Ok(scene), |n| scene.with_triangles(n))?;
+                write(scene.files().map(SceneFile::Generated), folder)
             }
-            Ok(())
-        }
-        SceneCommand::Write { name, folder } => write(name, folder),
+            None => {
+                let names = builtin_names().join(", ");
+                let source = builtin(name).ok_or_else(|| {
+                    Failure::Usage(anyhow!("no built-in scene is called '{name}'; there are {names}"))
+                })?;
+                if triangles.is_some() {
+                    let message = format!("is for generated scenes; {name} always has the same triangles");
+                    return Err(RenderError::Option { option: "triangles", message }.into());
+                }
+                write(source.files().iter().map(SceneFile::Embedded), folder)
+            }
+        },
     }
 }
 
-fn write(name: &str, folder: &Path) -> Result<(), Failure> {
-    let names = builtin_names().join(", ");
-    let source = builtin(name)
-        .ok_or_else(|| Failure::Usage(anyhow!("no built-in scene is called '{name}'; there are {names}")))?;
-    for file in source.files() {
-        let path = folder.join(&*file.path);
+/// A name a line, and after those of generated scenes what they are.
+fn list() -> Result<(), Failure> {
+    let stdout = &mut io::stdout();
+    for name in builtin_names() {
+        match generated(name) {
+            Some(scene) => writeln!(stdout, "{name:<12}generated, {} triangles by default", scene.triangles())?,
+            None => writeln!(stdout, "{name}")?,
+        }
+    }
+    Ok(())
+}
+
+enum SceneFile<'a> {
+    Embedded(&'a EmbeddedFile),
+    Generated(GeneratedFile),
+}
+
+impl SceneFile<'_> {
+    fn path(&self) -> &str {
+        match self {
+            Self::Embedded(file) => &file.path,
+            Self::Generated(file) => file.path,
+        }
+    }
+
+    fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        match self {
+            Self::Embedded(file) => out.write_all(file.text.as_bytes()),
+            Self::Generated(file) => file.write(out),
+        }
+    }
+}
+
+fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Result<(), Failure> {
+    // It only listens for Ctrl-C: large files take a while, and an unfinished one must not stay behind.
+    let reporter = Reporter::new(true)?;
+    for (written, file) in files.enumerate() {
+        let path = folder.join(file.path());
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent)
             .with_context(|| format!("cannot make the folder {}", parent.display()))
             .map_err(Failure::Work)?;
-        write_atomically(&path, |w| w.write_all(file.text.as_bytes()))
-            .with_context(|| format!("cannot write {}", path.display()))
-            .map_err(Failure::Work)?;
-        writeln!(std::io::stdout(), "{}", path.display())?;
+        let result = write_atomically(&path, |out| file.write(&mut Interruptible { out, reporter: &reporter }));
+        if result.is_err() && reporter.interrupted() {
+            return Err(Failure::InterruptedAfter { written });
+        }
+        result.with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+        writeln!(io::stdout(), "{}", path.display())?;
     }
     Ok(())
+}
+
+/// A writer that fails once Ctrl-C was pressed.
+struct Interruptible<'a> {
+    out: &'a mut dyn Write,
+    reporter: &'a Reporter,
+}
+
+impl Write for Interruptible<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.reporter.interrupted() {
+            // Not `ErrorKind::Interrupted`, which callers take as a request to try again.
+            return Err(io::Error::other("interrupted"));
+        }
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }

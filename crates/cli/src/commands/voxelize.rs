@@ -34,7 +34,7 @@ pub(crate) fn run(args: &VoxelizeArgs) -> Result<(), Failure> {
         for (name, set) in sets(&voxels) {
             // Each file appears whole or not at all; those that are there stay.
             if reporter.interrupted() {
-                return Err(Failure::InterruptedAfter(written.len()));
+                return Err(Failure::InterruptedAfter { written: written.len() });
             }
             written.extend(export(folder, &name, &voxels.grid, set)?);
         }

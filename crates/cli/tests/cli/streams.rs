@@ -21,21 +21,8 @@ fn ticks(child: &Child) -> u64 {
     fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap()
 }
 
-#[test]
-fn ctrl_c_stops_inside_a_tile() {
-    // One tile of minutes of work.
-    let size = ["render", "-D", "width=16", "-D", "height=16", "--spp", "100000000", "--method", "none"];
-    ctrl_c_stops(&[&size[..], &["--stats", "fog.json"]].concat());
-}
-
-#[test]
-fn ctrl_c_stops_a_verification() {
-    ctrl_c_stops(&["verify", "--segments", "1e12", "--voxel", "32", "--stats", "fog.json"]);
-}
-
-/// Interrupts the program after a while of work; it must end soon, with one message, and leave nothing behind.
-fn ctrl_c_stops(args: &[&str]) {
-    let sandbox = Sandbox::new();
+/// Runs the program until it has worked for 0.3 s, and sends it the signal of Ctrl-C; it must end soon.
+fn interrupted(sandbox: &Sandbox, args: &[&str]) -> Outcome {
     let mut child = sandbox.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let deadline = Instant::now() + Duration::from_secs(60);
     while ticks(&child) < 30 && Instant::now() < deadline {
@@ -49,10 +36,39 @@ fn ctrl_c_stops(args: &[&str]) {
         }
         thread::sleep(Duration::from_millis(10));
     }
-    let outcome = Outcome::new(args, &child.wait_with_output().unwrap());
+    Outcome::new(args, &child.wait_with_output().unwrap())
+}
+
+#[test]
+fn ctrl_c_stops_inside_a_tile() {
+    // One tile of minutes of work.
+    let size = ["render", "-D", "width=16", "-D", "height=16", "--spp", "100000000", "--method", "none"];
+    nothing_is_left_after_ctrl_c(&[&size[..], &["--stats", "fog.json"]].concat());
+}
+
+#[test]
+fn ctrl_c_stops_a_verification() {
+    nothing_is_left_after_ctrl_c(&["verify", "--segments", "1e12", "--voxel", "32", "--stats", "fog.json"]);
+}
+
+fn nothing_is_left_after_ctrl_c(args: &[&str]) {
+    let sandbox = Sandbox::new();
+    let outcome = interrupted(&sandbox, args);
     assert_eq!(outcome.code, Some(130), "{}", outcome.stderr);
     assert_eq!((outcome.stdout.as_str(), outcome.stderr.as_str()), ("", "interrupted; nothing was written\n"));
     assert!(sandbox.files().is_empty(), "{:?}", sandbox.files());
+}
+
+#[test]
+fn ctrl_c_stops_inside_a_file() {
+    let sandbox = Sandbox::new();
+    // Seconds of work, most of it in two files.
+    let outcome = interrupted(&sandbox, &["scene", "write", "scape", "a", "--triangles", "10000000"]);
+    let message = format!("interrupted; {} files were written, each of them whole\n", outcome.stdout.lines().count());
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(130), message.as_str()));
+    let on_disk: usize = ["a", "a/meshes"].map(|f| fs::read_dir(sandbox.path().join(f)).unwrap().count()).iter().sum();
+    // The folder of the meshes is not listed; nothing else may be there that is not.
+    assert_eq!(on_disk, outcome.stdout.lines().count() + 1, "{}", outcome.stdout);
 }
 
 #[test]

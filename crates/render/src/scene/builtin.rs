@@ -2,12 +2,13 @@
 
 use std::borrow::Cow;
 
+use super::generate::{GeneratedFile, GeneratedScene, generated};
 use super::source::{EmbeddedFile, SceneSource};
 
 /// The scene that is rendered when none is named.
 pub const DEFAULT_SCENE: &str = "cbox_vol2";
 
-const NAMES: [&str; 4] = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6"];
+const NAMES: [&str; 6] = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "san-miguel", "scape"];
 
 macro_rules! scene_file {
     ($path:literal) => {
@@ -24,7 +25,7 @@ pub const fn builtin_names() -> &'static [&'static str] {
     &NAMES
 }
 
-/// The built-in scene of that name.
+/// The built-in scene of that name. A generated one is made in its default size: some ten megabytes of text.
 #[must_use]
 pub fn builtin(name: &str) -> Option<SceneSource> {
     let scene = match name {
@@ -32,7 +33,7 @@ pub fn builtin(name: &str) -> Option<SceneSource> {
         "cbox_vol3" => scene_file!("cbox_vol3.xml"),
         "cbox_vol4" => scene_file!("cbox_vol4.xml"),
         "cbox_vol6" => scene_file!("cbox_vol6.xml"),
-        _ => return None,
+        _ => return generated(name).map(in_memory),
     };
     let mut meshes = vec![
         scene_file!("meshes/cbox_white.obj"),
@@ -45,4 +46,16 @@ pub fn builtin(name: &str) -> Option<SceneSource> {
         meshes.push(scene_file!("meshes/cbox_tall_block.obj"));
     }
     Some(SceneSource::embedded(scene, meshes))
+}
+
+fn in_memory(scene: GeneratedScene) -> SceneSource {
+    let embedded = |file: GeneratedFile| {
+        let mut text = Vec::new();
+        // A vector takes whatever is written, and all that is written is UTF-8.
+        let _ = file.write(&mut text);
+        EmbeddedFile { path: Cow::Borrowed(file.path), text: Cow::Owned(String::from_utf8(text).unwrap_or_default()) }
+    };
+    let mut files: Vec<_> = scene.files().map(embedded).collect();
+    // The scene file is always there, and it is the first.
+    SceneSource::embedded(files.remove(0), files)
 }

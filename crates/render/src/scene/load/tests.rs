@@ -62,8 +62,8 @@ fn with_sensor(body: &str, sensor: &str) -> String {
 }
 
 #[test]
-fn the_builtin_scenes_load_and_say_what_the_design_says() {
-    for name in builtin_names() {
+fn the_builtin_boxes_load_and_say_what_the_design_says() {
+    for name in builtin_names().iter().filter(|name| name.starts_with("cbox")) {
         let scene = Scene::from_source(&builtin(name).unwrap(), &LoadOptions::default()).unwrap();
         assert_eq!(scene.warnings, Vec::<String>::new(), "{name}");
         assert_eq!((scene.film.width, scene.film.height), (512, 512));
