@@ -10,7 +10,7 @@ use vdf_voxel::{VoxelError, VoxelGrid, VoxelSet, voxelize};
 use crate::{
     Method, Triangle,
     scene::Emitter,
-    visibility::{FieldProofs, NeighbourhoodProofs, NoProofs},
+    visibility::{FieldProofs, NeighbourhoodProofs, NoProofs, Proofs},
 };
 
 /// The proofs of one method, ready to be asked. Matched once for a whole render, never per query.
@@ -22,6 +22,15 @@ pub enum Acceleration {
     Amr(FieldProofs<Amr>),
     NdfSn(NeighbourhoodProofs<Ndf>),
     AmrSn(NeighbourhoodProofs<Amr>),
+}
+
+/// What is done with the proofs of a method, whichever that is: compiled for each, so that nothing is decided in its loops.
+pub trait ProofsVisitor {
+    /// The result.
+    type Output;
+
+    /// Does it.
+    fn visit<P: Proofs>(self, proofs: &P) -> Self::Output;
 }
 
 /// What was built, how large it is and how long it took.
@@ -91,13 +100,14 @@ impl Acceleration {
         Ok((acceleration, report))
     }
 
-    /// For each emitter its safe neighbourhood; none at all with a method that builds none.
-    #[must_use]
-    pub fn neighbourhoods(&self) -> &[Option<SafeNeighbourhood>] {
+    /// Gives the proofs to `visitor`.
+    pub fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
         match self {
-            Self::None(_) | Self::Ndf(_) | Self::Amr(_) => &[],
-            Self::NdfSn(p) => &p.neighbourhoods,
-            Self::AmrSn(p) => &p.neighbourhoods,
+            Self::None(proofs) => visitor.visit(proofs),
+            Self::Ndf(proofs) => visitor.visit(proofs),
+            Self::Amr(proofs) => visitor.visit(proofs),
+            Self::NdfSn(proofs) => visitor.visit(proofs),
+            Self::AmrSn(proofs) => visitor.visit(proofs),
         }
     }
 }

@@ -28,7 +28,7 @@ mod visibility;
 mod voxels;
 mod world;
 
-pub use acceleration::{Acceleration, BuildReport};
+pub use acceleration::{Acceleration, BuildReport, ProofsVisitor};
 pub use atomic_file::{check_writable, write_atomically};
 pub use error::RenderError;
 pub use image::Image;

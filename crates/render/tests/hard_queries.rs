@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3, dvec3, vec3};
 use vdf_render::{
-    Acceleration, Answer, Lights, Method, Proofs, Rgb, Triangle,
+    Acceleration, Answer, Lights, Method, Proofs, ProofsVisitor, Rgb, Triangle,
     geometry::{Bvh, Segment, intersect_exact},
     scene::{self, Emitter, LoadOptions, Scene},
 };
@@ -26,16 +26,18 @@ struct Found {
 }
 
 fn answer(acceleration: &Acceleration, emitter: Option<usize>, from: DVec3, to: DVec3) -> Answer {
-    fn ask(proofs: &impl Proofs, emitter: Option<usize>, from: DVec3, to: DVec3) -> Answer {
-        emitter.map_or_else(|| proofs.answer_between(from, to), |e| proofs.answer(e, from, to))
+    struct Ask(Option<usize>, DVec3, DVec3);
+
+    impl ProofsVisitor for Ask {
+        type Output = Answer;
+
+        fn visit<P: Proofs>(self, proofs: &P) -> Answer {
+            let Self(emitter, from, to) = self;
+            emitter.map_or_else(|| proofs.answer_between(from, to), |e| proofs.answer(e, from, to))
+        }
     }
-    match acceleration {
-        Acceleration::None(p) => ask(p, emitter, from, to),
-        Acceleration::Ndf(p) => ask(p, emitter, from, to),
-        Acceleration::Amr(p) => ask(p, emitter, from, to),
-        Acceleration::NdfSn(p) => ask(p, emitter, from, to),
-        Acceleration::AmrSn(p) => ask(p, emitter, from, to),
-    }
+
+    acceleration.accept(Ask(emitter, from, to))
 }
 
 impl Fixture {
@@ -191,7 +193,7 @@ fn case_10_not_a_number() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut t = square(2.0, 6.0, 4.0);
         t[1].vertices[2].y = bad as f32;
-        assert!(Acceleration::build(Method::Amr, &t, BOX, &[], 1.0, 1 << 20).is_err());
+        assert!(Acceleration::build(Method::default(), &t, BOX, &[], 1.0, 1 << 20).is_err());
         for axis in 0..3 {
             let mut p = v(1.0, 1.0, 1.0);
             p[axis] = bad;

@@ -46,7 +46,7 @@ pub(crate) fn run(args: &VoxelizeArgs) -> Result<(), Failure> {
 fn sets(voxels: &SceneVoxels) -> Vec<(String, &VoxelSet)> {
     let mut sets = vec![("occupied".to_owned(), &voxels.occupied)];
     for (i, neighbourhood) in voxels.neighbourhoods.iter().enumerate() {
-        sets.extend(neighbourhood.as_ref().map(|n| (format!("neighbourhood{i}"), n.voxels())));
+        sets.extend(neighbourhood.as_ref().map(|n| (format!("neighbourhood{i}"), n)));
     }
     sets
 }

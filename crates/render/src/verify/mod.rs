@@ -29,7 +29,7 @@ pub use self::{
     segments::SegmentClass,
 };
 use crate::{
-    Acceleration, Answer, Method, Progress, Proofs, RenderError, World,
+    Acceleration, Answer, Method, Progress, Proofs, ProofsVisitor, RenderError, World,
     options::{check_voxel_size, default_voxel_size, fail, on_threads},
     scene::Scene,
 };
@@ -39,6 +39,9 @@ const BLOCK: u64 = 4096;
 
 /// Failures that are told in full.
 const TOLD: usize = 20;
+
+/// A claim of each has one bit.
+const MOST_METHODS: usize = 32;
 
 const CLASSES: usize = SegmentClass::ALL.len();
 
@@ -84,6 +87,9 @@ impl VerifyOptions {
         }
         if self.methods.is_empty() || self.methods.contains(&Method::None) {
             return fail("method", "must name methods that prove something; none does not".into());
+        }
+        if self.methods.len() > MOST_METHODS {
+            return fail("method", format!("must name at most {MOST_METHODS} methods"));
         }
         self.voxel_sizes.iter().try_for_each(|&size| check_voxel_size(size))
     }
@@ -140,7 +146,7 @@ fn verify_in_pool(
         let start = Instant::now();
         let [from, to] = [number, number + 1].map(|n| part(options.segments, n.into(), sizes.len() as u64));
         let run = Run {
-            claimants: methods.iter().map(claimant).collect(),
+            claimants: methods.iter().map(|m| m as &dyn Claimant).collect(),
             names: &names,
             generator: Generator::new(scene, &world, grid, options.seed, number),
             oracle: &oracle,
@@ -180,7 +186,7 @@ struct Claims {
     occluded: u32,
 }
 
-/// A method, asked about blocks of segments: one virtual call a block.
+/// Whoever is asked about blocks of segments: one virtual call a block.
 trait Claimant: Sync {
     /// Sets bit `bit` of what is claimed of each of `queries`.
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32);
@@ -202,14 +208,19 @@ impl<P: Proofs> Claimant for P {
     }
 }
 
-/// The only place that knows how proofs are stored.
-fn claimant(acceleration: &Acceleration) -> &dyn Claimant {
-    match acceleration {
-        Acceleration::None(p) => p,
-        Acceleration::Ndf(p) => p,
-        Acceleration::Amr(p) => p,
-        Acceleration::NdfSn(p) => p,
-        Acceleration::AmrSn(p) => p,
+impl Claimant for Acceleration {
+    fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
+        struct Claim<'a>(&'a [Query], &'a mut [Claims], u32);
+
+        impl ProofsVisitor for Claim<'_> {
+            type Output = ();
+
+            fn visit<P: Proofs>(self, proofs: &P) {
+                proofs.claim(self.0, self.1, self.2);
+            }
+        }
+
+        self.accept(Claim(queries, claims, bit));
     }
 }
 
