@@ -122,16 +122,16 @@ impl<'a> Generator<'a> {
             SegmentClass::Edge => self.through(draw, Self::on_edge),
             SegmentClass::Surface => {
                 let p = self.near_surface(draw);
-                self.from(draw, p)
+                self.onwards(draw, p)
             }
             SegmentClass::Lattice => self.along_lattice(draw),
-            SegmentClass::Corner => self.from_corner(draw),
+            SegmentClass::Corner => self.across_corner(draw),
             SegmentClass::Axis => self.along_axis(draw),
             SegmentClass::Short => self.short(draw),
-            SegmentClass::Outside => self.from_outside(draw),
+            SegmentClass::Outside => self.with_end_outside(draw),
             SegmentClass::Occupied => {
                 let p = self.near_occupied(draw);
-                self.from(draw, p)
+                self.onwards(draw, p)
             }
         }
     }
@@ -153,7 +153,7 @@ impl<'a> Generator<'a> {
     }
 
     /// From `p` to a light or to anywhere.
-    fn from(&self, draw: &mut Draw, p: DVec3) -> Query {
+    fn onwards(&self, draw: &mut Draw, p: DVec3) -> Query {
         match self.light(draw) {
             Some((emitter, q)) => Query { segment: Segment::new(p, q), emitter: Some(emitter) },
             None => between(p, self.anywhere(draw)),
@@ -188,7 +188,7 @@ impl<'a> Generator<'a> {
     fn along_lattice(&self, draw: &mut Draw) -> Query {
         let p = self.lattice(draw);
         let mut q = match draw.pick(3) {
-            0 => return self.from(draw, p),
+            0 => return self.onwards(draw, p),
             1 => self.lattice(draw),
             _ => self.uniform(draw),
         };
@@ -201,7 +201,7 @@ impl<'a> Generator<'a> {
         between(p, nudged(draw, q))
     }
 
-    fn from_corner(&self, draw: &mut Draw) -> Query {
+    fn across_corner(&self, draw: &mut Draw) -> Query {
         let (origin, size) = (self.grid.origin(), self.grid.voxel_size());
         let mut p = (self.touching(draw) - origin) / size;
         for axis in 0..3 {
@@ -211,7 +211,7 @@ impl<'a> Generator<'a> {
         }
         let p = nudged(draw, origin + p * size);
         if draw.chance(0.5) {
-            return self.from(draw, p);
+            return self.onwards(draw, p);
         }
         let length = draw.of(&[1e-9, 1e-3, 0.3, 1.0, 2.0]) * size;
         let d = DVec3::from_array([(); 3].map(|()| 2.0 * draw.unit() - 1.0));
@@ -245,10 +245,10 @@ impl<'a> Generator<'a> {
         Query { segment: Segment::new(q + d * length, q), emitter: light.map(|(emitter, _)| emitter) }
     }
 
-    fn from_outside(&self, draw: &mut Draw) -> Query {
+    fn with_end_outside(&self, draw: &mut Draw) -> Query {
         let p = self.outside(draw);
         match draw.pick(3) {
-            0 => self.from(draw, p),
+            0 => self.onwards(draw, p),
             // Through a place inside, to the other side.
             1 => {
                 let middle = self.anywhere(draw);

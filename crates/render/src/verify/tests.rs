@@ -60,7 +60,7 @@ impl Progress for Quiet {
 /// Always says the same, or the truth but for queries towards emitter 1.
 enum Liar {
     Always(Answer),
-    AboutEmitter1(World),
+    AboutEmitter1(Box<World>),
 }
 
 impl Proofs for Liar {
@@ -115,7 +115,7 @@ fn a_liar_is_caught_in_every_class() {
 #[test]
 fn a_wrong_answer_for_an_emitter_is_not_hidden_by_a_right_one_for_the_points() {
     let scene = scene();
-    let sum = asked(&Liar::AboutEmitter1(World::new(&scene)), 22_000);
+    let sum = asked(&Liar::AboutEmitter1(Box::new(World::new(&scene))), 22_000);
     assert!(sum.methods[1][1] > 500, "{:?}", sum.methods);
     assert!(sum.failures.iter().all(|f| f.emitter == Some(1) && f.to == [1.0; 3]));
 }
