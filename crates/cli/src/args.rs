@@ -186,7 +186,7 @@ pub(crate) struct VoxelizeArgs {
     /// Side of a voxel in world units [default: a 128th of the scene's longest side]
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
-    /// Method that builds the neighbourhoods; only those that end in sn have any
+    /// Method that proves which voxels see a light
     #[arg(long, default_value_t, value_name = "METHOD")]
     pub(crate) method: Method,
     /// Folder to write the voxels to; made if it does not exist

@@ -104,18 +104,6 @@ impl Acceleration {
         Ok((acceleration, report))
     }
 
-    /// For each emitter the voxels of its neighbourhood, if it has one; none at all with a method that builds none.
-    #[must_use]
-    pub fn neighbourhoods(&self) -> Vec<Option<VoxelSet>> {
-        match self {
-            Self::None(_) => vec![],
-            Self::Ndf(field) => field.neighbourhoods(),
-            Self::Amr(field) => field.neighbourhoods(),
-            Self::Dsz(field) => field.neighbourhoods(),
-            Self::Dual(field) => field.neighbourhoods(),
-        }
-    }
-
     /// Gives the proofs to `visitor`.
     pub fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
         match self {
@@ -129,17 +117,6 @@ impl Acceleration {
 }
 
 impl<F: SafeZones> FieldAcceleration<F> {
-    fn neighbourhoods(&self) -> Vec<Option<VoxelSet>> {
-        fn sets<N: Neighbourhood>(neighbourhoods: &[Option<N>]) -> Vec<Option<VoxelSet>> {
-            neighbourhoods.iter().map(|n| n.as_ref().map(|n| n.voxels().into_owned())).collect()
-        }
-        match self {
-            Self::None(_) => vec![],
-            Self::Safe(proofs) => sets(&proofs.neighbourhoods),
-            Self::Extended(proofs) => sets(&proofs.neighbourhoods),
-        }
-    }
-
     fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
         match self {
             Self::None(proofs) => visitor.visit(proofs),

@@ -25,24 +25,19 @@ struct Found {
     proofs: usize,
 }
 
-/// One question to whichever method.
-struct Ask {
-    emitter: Option<usize>,
-    from: DVec3,
-    to: DVec3,
-}
-
-impl ProofsVisitor for Ask {
-    type Output = Answer;
-
-    fn visit<P: Proofs>(self, proofs: &P) -> Answer {
-        let Self { emitter, from, to } = self;
-        emitter.map_or_else(|| proofs.answer_between(from, to), |e| proofs.answer(e, from, to))
-    }
-}
-
 fn answer(acceleration: &Acceleration, emitter: Option<usize>, from: DVec3, to: DVec3) -> Answer {
-    acceleration.accept(Ask { emitter, from, to })
+    struct Ask(Option<usize>, DVec3, DVec3);
+
+    impl ProofsVisitor for Ask {
+        type Output = Answer;
+
+        fn visit<P: Proofs>(self, proofs: &P) -> Answer {
+            let Self(emitter, from, to) = self;
+            emitter.map_or_else(|| proofs.answer_between(from, to), |e| proofs.answer(e, from, to))
+        }
+    }
+
+    acceleration.accept(Ask(emitter, from, to))
 }
 
 impl Fixture {

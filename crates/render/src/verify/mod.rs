@@ -40,6 +40,9 @@ const BLOCK: u64 = 4096;
 /// Failures that are told in full.
 const TOLD: usize = 20;
 
+/// A claim of each has one bit.
+const MOST_METHODS: usize = 32;
+
 const CLASSES: usize = SegmentClass::ALL.len();
 
 /// What to verify.
@@ -84,6 +87,9 @@ impl VerifyOptions {
         }
         if self.methods.is_empty() || self.methods.contains(&Method::None) {
             return fail("method", "must name methods that prove something; none does not".into());
+        }
+        if self.methods.len() > MOST_METHODS {
+            return fail("method", format!("must name at most {MOST_METHODS} methods"));
         }
         self.voxel_sizes.iter().try_for_each(|&size| check_voxel_size(size))
     }
@@ -180,40 +186,41 @@ struct Claims {
     occluded: u32,
 }
 
-/// A method, asked about blocks of segments: one virtual call a block.
+/// Whoever is asked about blocks of segments: one virtual call a block.
 trait Claimant: Sync {
     /// Sets bit `bit` of what is claimed of each of `queries`.
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32);
 }
 
-impl Claimant for Acceleration {
+impl<P: Proofs> Claimant for P {
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
-        self.accept(Claim { queries, claims, bit });
-    }
-}
-
-/// Asks proofs about a block of segments: sets bit `bit` of what is claimed of each of `queries`.
-struct Claim<'a> {
-    queries: &'a [Query],
-    claims: &'a mut [Claims],
-    bit: u32,
-}
-
-impl ProofsVisitor for Claim<'_> {
-    type Output = ();
-
-    fn visit<P: Proofs>(self, proofs: &P) {
-        for (query, claims) in self.queries.iter().zip(self.claims) {
+        for (query, claims) in queries.iter().zip(claims) {
             let (p, q) = (query.segment.p, query.segment.q);
             // A query towards an emitter may have an answer of its own; the one for any two points has to be right as well.
-            for answer in [query.emitter.map(|e| proofs.answer(e, p, q)), Some(proofs.answer_between(p, q))] {
+            for answer in [query.emitter.map(|e| self.answer(e, p, q)), Some(self.answer_between(p, q))] {
                 match answer {
-                    Some(Answer::Unoccluded) => claims.unoccluded |= 1 << self.bit,
-                    Some(Answer::Occluded) => claims.occluded |= 1 << self.bit,
+                    Some(Answer::Unoccluded) => claims.unoccluded |= 1 << bit,
+                    Some(Answer::Occluded) => claims.occluded |= 1 << bit,
                     Some(Answer::Unknown) | None => {}
                 }
             }
         }
+    }
+}
+
+impl Claimant for Acceleration {
+    fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
+        struct Claim<'a>(&'a [Query], &'a mut [Claims], u32);
+
+        impl ProofsVisitor for Claim<'_> {
+            type Output = ();
+
+            fn visit<P: Proofs>(self, proofs: &P) {
+                proofs.claim(self.0, self.1, self.2);
+            }
+        }
+
+        self.accept(Claim(queries, claims, bit));
     }
 }
 

@@ -30,6 +30,9 @@ pub enum SegmentClass {
     Surface,
     /// Ends on faces, edges and corners of voxels, and segments along those.
     Lattice,
+    /// From where an occluder comes close to a corner, an edge or a face of a voxel, across the occluder: only the dilation of
+    /// the occupied voxels keeps a proof from being wrong there.
+    Corner,
     /// Parallel to an axis, with zeros of either sign.
     Axis,
     /// Of length zero, or within a voxel or two.
@@ -42,13 +45,14 @@ pub enum SegmentClass {
 
 impl SegmentClass {
     /// All classes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Random,
         Self::Light,
         Self::Vertex,
         Self::Edge,
         Self::Surface,
         Self::Lattice,
+        Self::Corner,
         Self::Axis,
         Self::Short,
         Self::Outside,
@@ -65,6 +69,7 @@ impl SegmentClass {
             Self::Edge => "edge",
             Self::Surface => "surface",
             Self::Lattice => "lattice",
+            Self::Corner => "corner",
             Self::Axis => "axis",
             Self::Short => "short",
             Self::Outside => "outside",
@@ -117,15 +122,16 @@ impl<'a> Generator<'a> {
             SegmentClass::Edge => self.through(draw, Self::on_edge),
             SegmentClass::Surface => {
                 let p = self.near_surface(draw);
-                self.from(draw, p)
+                self.onwards(draw, p)
             }
             SegmentClass::Lattice => self.along_lattice(draw),
+            SegmentClass::Corner => self.across_corner(draw),
             SegmentClass::Axis => self.along_axis(draw),
             SegmentClass::Short => self.short(draw),
-            SegmentClass::Outside => self.from_outside(draw),
+            SegmentClass::Outside => self.with_end_outside(draw),
             SegmentClass::Occupied => {
                 let p = self.near_occupied(draw);
-                self.from(draw, p)
+                self.onwards(draw, p)
             }
         }
     }
@@ -147,7 +153,7 @@ impl<'a> Generator<'a> {
     }
 
     /// From `p` to a light or to anywhere.
-    fn from(&self, draw: &mut Draw, p: DVec3) -> Query {
+    fn onwards(&self, draw: &mut Draw, p: DVec3) -> Query {
         match self.light(draw) {
             Some((emitter, q)) => Query { segment: Segment::new(p, q), emitter: Some(emitter) },
             None => between(p, self.anywhere(draw)),
@@ -182,7 +188,7 @@ impl<'a> Generator<'a> {
     fn along_lattice(&self, draw: &mut Draw) -> Query {
         let p = self.lattice(draw);
         let mut q = match draw.pick(3) {
-            0 => return self.from(draw, p),
+            0 => return self.onwards(draw, p),
             1 => self.lattice(draw),
             _ => self.uniform(draw),
         };
@@ -193,6 +199,23 @@ impl<'a> Generator<'a> {
             }
         }
         between(p, nudged(draw, q))
+    }
+
+    fn across_corner(&self, draw: &mut Draw) -> Query {
+        let (origin, size) = (self.grid.origin(), self.grid.voxel_size());
+        let mut p = (self.touching(draw) - origin) / size;
+        for axis in 0..3 {
+            if draw.chance(0.8) {
+                p[axis] = p[axis].round();
+            }
+        }
+        let p = nudged(draw, origin + p * size);
+        if draw.chance(0.5) {
+            return self.onwards(draw, p);
+        }
+        let length = draw.of(&[1e-9, 1e-3, 0.3, 1.0, 2.0]) * size;
+        let d = DVec3::from_array([(); 3].map(|()| 2.0 * draw.unit() - 1.0));
+        between(p, p + d * length)
     }
 
     fn along_axis(&self, draw: &mut Draw) -> Query {
@@ -222,10 +245,10 @@ impl<'a> Generator<'a> {
         Query { segment: Segment::new(q + d * length, q), emitter: light.map(|(emitter, _)| emitter) }
     }
 
-    fn from_outside(&self, draw: &mut Draw) -> Query {
+    fn with_end_outside(&self, draw: &mut Draw) -> Query {
         let p = self.outside(draw);
         match draw.pick(3) {
-            0 => self.from(draw, p),
+            0 => self.onwards(draw, p),
             // Through a place inside, to the other side.
             1 => {
                 let middle = self.anywhere(draw);
@@ -294,13 +317,18 @@ impl<'a> Generator<'a> {
         }
     }
 
-    /// A vertex, a point on an edge or in the face of a triangle, on it or beside it.
-    fn near_surface(&self, draw: &mut Draw) -> DVec3 {
-        let p = match draw.pick(3) {
+    /// A vertex, a point on an edge or in the face of a triangle.
+    fn touching(&self, draw: &mut Draw) -> DVec3 {
+        match draw.pick(3) {
             0 => self.vertex(draw),
             1 => self.on_edge(draw),
             _ => self.on_surface(draw),
-        };
+        }
+    }
+
+    /// The same, or a point beside it.
+    fn near_surface(&self, draw: &mut Draw) -> DVec3 {
+        let p = self.touching(draw);
         let beside = DVec3::from_array([(); 3].map(|()| draw.unit() - 0.5));
         let distance = draw.of(&BESIDE) * self.grid.voxel_size();
         nudged(draw, p + beside * distance)

@@ -60,7 +60,7 @@ impl Progress for Quiet {
 /// Always says the same, or the truth but for queries towards emitter 1.
 enum Liar {
     Always(Answer),
-    AboutEmitter1(World),
+    AboutEmitter1(Box<World>),
 }
 
 impl Proofs for Liar {
@@ -80,18 +80,12 @@ impl Proofs for Liar {
     }
 }
 
-impl Claimant for Liar {
-    fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
-        Claim { queries, claims, bit }.visit(self);
-    }
-}
-
 fn asked(proofs: &Liar, segments: u64) -> Sum {
     let scene = scene();
     let world = World::new(&scene);
     let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, 0.125, 1 << 20).unwrap();
     let run = Run {
-        claimants: vec![&Acceleration::None(NoProofs), proofs],
+        claimants: vec![&NoProofs, proofs],
         names: &["none", "liar"],
         generator: Generator::new(&scene, &world, grid, 3, 0),
         oracle: &Oracle::new(&world),
@@ -103,16 +97,16 @@ fn asked(proofs: &Liar, segments: u64) -> Sum {
 #[test]
 fn a_liar_is_caught_in_every_class() {
     for answer in [Answer::Unoccluded, Answer::Occluded] {
-        let sum = asked(&Liar::Always(answer), 20_000);
+        let sum = asked(&Liar::Always(answer), 22_000);
         for (class, t) in SegmentClass::ALL.iter().zip(&sum.classes) {
             assert_eq!((t.segments, t.proved, t.proofs), (2000, 2000, 2000), "{class:?}");
             assert!(t.wrong > 0 && t.wrong < t.proofs, "{class:?}: {t:?}");
             assert_eq!(t.bound(), None);
         }
         let wrong: u64 = sum.classes.iter().map(|t| t.wrong).sum();
-        assert_eq!(sum.methods, [[0, 0], [20_000, wrong]]);
-        assert_eq!(sum.checks.proved_by_hierarchy, 20_000);
-        assert_eq!(sum.checks.proved_by_loop, 20_000);
+        assert_eq!(sum.methods, [[0, 0], [22_000, wrong]]);
+        assert_eq!(sum.checks.proved_by_hierarchy, 22_000);
+        assert_eq!(sum.checks.proved_by_loop, 22_000);
         assert_eq!(sum.failures.len(), TOLD);
         assert!(sum.failures.iter().all(|f| f.methods == ["liar"]));
     }
@@ -121,18 +115,18 @@ fn a_liar_is_caught_in_every_class() {
 #[test]
 fn a_wrong_answer_for_an_emitter_is_not_hidden_by_a_right_one_for_the_points() {
     let scene = scene();
-    let sum = asked(&Liar::AboutEmitter1(World::new(&scene)), 20_000);
+    let sum = asked(&Liar::AboutEmitter1(Box::new(World::new(&scene))), 22_000);
     assert!(sum.methods[1][1] > 500, "{:?}", sum.methods);
     assert!(sum.failures.iter().all(|f| f.emitter == Some(1) && f.to == [1.0; 3]));
 }
 
 #[test]
 fn silence_is_no_proof() {
-    let sum = asked(&Liar::Always(Answer::Unknown), 20_000);
+    let sum = asked(&Liar::Always(Answer::Unknown), 22_000);
     assert!(sum.classes.iter().all(|t| t.proved == 0 && t.proofs == 0 && t.bound().is_none()));
     assert!(sum.failures.is_empty() && sum.checks.disagreements == 0);
     // One in sixteen is compared all the same.
-    assert_eq!(sum.checks.compared, 10 * 2000 / 16);
+    assert_eq!(sum.checks.compared, 11 * 2000 / 16);
 }
 
 #[test]
@@ -159,16 +153,16 @@ fn a_failure_can_be_repeated_from_its_text() {
 fn the_report_does_not_depend_on_threads() {
     let report = |threads| {
         let voxel_sizes = vec![0.125, 0.1];
-        let options = VerifyOptions { voxel_sizes, segments: 50_001, threads: Some(threads), ..Default::default() };
+        let options = VerifyOptions { voxel_sizes, segments: 55_001, threads: Some(threads), ..Default::default() };
         let report = verify(&scene(), &options, &Quiet(false)).unwrap();
         VerifyReport { seconds: 0.0, threads: 0, ..report }
     };
     let one = report(1);
     assert_eq!(one, report(3));
     assert!(one.is_sound(), "{one}");
-    assert_eq!((one.total.segments, one.grids.len()), (50_001, 2));
+    assert_eq!((one.total.segments, one.grids.len()), (55_001, 2));
     assert!(one.classes.iter().all(|c| c.tally.segments.abs_diff(5000) <= 2), "{one}");
-    assert!(one.methods.iter().all(|m| m.proofs > 5000), "{one}");
+    assert!(one.methods.iter().all(|m| m.proofs > 2000), "{one}");
     assert_eq!(one.total.bound(), Some(3.0 / one.total.proved as f64));
 }
 
@@ -200,6 +194,7 @@ fn bad_options_and_a_wish_to_stop_are_errors() {
     assert_eq!(option(with(|o| o.segments = 0)), "segments");
     assert_eq!(option(with(|o| o.methods.clear())), "method");
     assert_eq!(option(with(|o| o.methods.push(Method::None))), "method");
+    assert_eq!(option(with(|o| o.methods = vec![Method::default(); 33])), "method");
     assert_eq!(option(with(|o| o.threads = Some(0))), "threads");
     assert_eq!(option(with(|o| o.voxel_sizes = vec![0.1, -1.0])), "voxel");
     assert!(matches!(with(|o| o.voxel_sizes = vec![1e-9]), Err(RenderError::Voxel(_))));
@@ -233,6 +228,10 @@ fn classes_are_what_they_say() {
         move |q: &Query| (0..3).any(|k| q.segment.p[k] == 0.0 && q.segment.p[k].is_sign_negative() == sign)
     };
     assert!(count(SegmentClass::Axis, &zero_of(true)) > 50 && count(SegmentClass::Axis, &zero_of(false)) > 50);
+    // The wall is in the plane of faces, so a snapped point stays on it.
+    assert!(
+        count(SegmentClass::Corner, &|q| q.segment.p.x == 0.5 && q.segment.p.to_array().into_iter().all(whole)) > 500
+    );
     assert!(count(SegmentClass::Short, &|q| q.segment.length() == 0.0) > 200);
     assert!(count(SegmentClass::Outside, &|q| !inside(q.segment.p)) > 800);
     assert!(count(SegmentClass::Outside, &|q| q.segment.p.abs().max_element() > 1e11) > 200);
