@@ -1,4 +1,5 @@
 //! The metrics of `vdf compare` against NVIDIA's flip-evaluator, scikit-image and numpy; see tests/metrics/README.md.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::path::{Path, PathBuf};
 

@@ -60,7 +60,7 @@ pub(super) fn luminance(rgb: Rgb) -> f64 {
 /// The HyAB distance of two colours in CIELAB: |ΔL| + √(Δa² + Δb²) \[Abasi2020\].
 pub(super) fn hyab(a: Vec3, b: Vec3) -> f32 {
     let d = a - b;
-    d.x.abs() + d.y.hypot(d.z)
+    d.x.abs() + (d.y * d.y + d.z * d.z).sqrt()
 }
 
 /// The curve of CIELAB: a cube root with a straight part near black.
