@@ -1,9 +1,6 @@
 //! `vdf compare`.
 
-use std::{
-    io::Write as _,
-    path::{Path, PathBuf},
-};
+use std::{io::Write as _, path::Path};
 
 use anyhow::{Context as _, anyhow};
 use vdf_render::{
@@ -46,7 +43,7 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
 }
 
 /// Fails now if the map cannot be written, or would replace an image.
-fn check_map(map: &PathBuf, args: &CompareArgs) -> Result<(), Failure> {
+fn check_map(map: &Path, args: &CompareArgs) -> Result<(), Failure> {
     let canonical = |path: &Path| path.canonicalize().ok();
     if canonical(map)
         .is_some_and(|map| [&args.a, &args.b].into_iter().any(|image| canonical(image).as_ref() == Some(&map)))
