@@ -3,7 +3,7 @@
 use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use vdf_render::{Method, UnknownMethod, scene::PixelRect};
+use vdf_render::{Method, UnknownMethod, metrics::PIXELS_PER_DEGREE, scene::PixelRect};
 
 /// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.
 #[derive(Debug, Parser)]
@@ -200,16 +200,50 @@ pub(crate) struct VoxelizeArgs {
     pub(crate) defines: Vec<(String, String)>,
 }
 
-/// Compare two EXR images: mean squared error, relative mean squared error, and whether they are identical.
+/// Compare an image with a reference: two EXR, or two PNG.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "relmse = mean of (A - B)^2 / (B^2 + 0.01 * (mean of B)^2). The exit code is 0 whatever the figures are."
-)]
+#[command(after_help = "Examples:
+  vdf compare fog.exr reference.exr --map error.png
+  vdf compare fog.exr reference.exr --max-relmse 1e-3 || echo too noisy
+
+Of linear values (a PNG is decoded as sRGB), over all pixels and channels:
+  mse       mean squared error
+  mae       mean absolute error
+  relmse    mean of (A - B)^2 / (B^2 + 0.01 * (mean of B)^2)
+Of values as displayed, that is clamped to [0, 1] and encoded as sRGB:
+  psnr      peak signal-to-noise ratio with the peak 1
+  ssim      structural similarity, window of 11 x 11 pixels, mean of the channels; 1 is equal
+Perceived differences, mean over the pixels, 0 is equal, 1 is the worst:
+  flip-ldr  FLIP of the values clamped to [0, 1]
+  flip-hdr  FLIP over all exposures that suit B; for EXR only
+And whether all pixels are the same, bit for bit.
+
+Exit codes: 0 compared, 1 relmse is more than --max-relmse or a file cannot be read or written,
+2 images that cannot be compared.")]
 pub(crate) struct CompareArgs {
     /// The image
     pub(crate) a: PathBuf,
     /// The reference
     pub(crate) b: PathBuf,
+    /// Write the map of FLIP (HDR-FLIP for EXR) in the colours of magma: black is equal, light yellow the worst
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) map: Option<PathBuf>,
+    /// Exit with 1 if relmse is more than this
+    #[arg(long, value_name = "X", value_parser = parse_limit, allow_negative_numbers = true)]
+    pub(crate) max_relmse: Option<f64>,
+    /// Pixels per degree of the observer's eye, for FLIP [default: 67.02, a 0.7 m wide display of 3840 pixels at 0.7 m]
+    #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE, hide_default_value = true, allow_negative_numbers = true)]
+    pub(crate) ppd: f64,
+    /// Print the figures as JSON; what is infinite or not defined is null
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn parse_limit(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(limit) if limit >= 0.0 => Ok(limit),
+        _ => Err("expected a number of 0 or more".to_owned()),
+    }
 }
 
 fn parse_define(text: &str) -> Result<(String, String), String> {

@@ -54,6 +54,14 @@ pub enum RenderError {
         /// Width and height of the other.
         b: [u32; 2],
     },
+    /// An image cannot be compared: it has no pixels, or one that is not finite.
+    #[error("cannot compare: the {image} {reason}")]
+    Uncomparable {
+        /// Which one: "image" or "reference".
+        image: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// An image could not be read or written.
     #[error(transparent)]
     Image(#[from] crate::ImageError),

@@ -9,7 +9,7 @@ use exr::prelude as openexr;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, WritableImage as _};
 
 use crate::atomic_file::write_atomically;
-use crate::{Image, Rgb};
+use crate::{Image, Rgb, srgb};
 
 /// Longer names of attributes break other programs (Nuke).
 const LONGEST_ATTRIBUTE_NAME: usize = 31;
@@ -118,14 +118,52 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue
 /// # Errors
 /// The file cannot be written, or the image has no pixels.
 pub fn write_png(path: &Path, image: &Image) -> Result<(), ImageError> {
-    let unencodable = |reason: String| ImageError::Unencodable { path: path.to_owned(), reason };
-    check_shape(image).map_err(unencodable)?;
+    check_shape(image).map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
     let samples: Vec<u8> = image.pixels.iter().flat_map(|pixel| pixel.to_array().map(srgb_byte)).collect();
+    write_png_bytes(path, image.width, image.height, &samples)
+}
+
+/// Writes an 8-bit PNG of red, green and blue, as a display takes them.
+pub(crate) fn write_png_bytes(path: &Path, width: u32, height: u32, samples: &[u8]) -> Result<(), ImageError> {
+    let unencodable = |reason: String| ImageError::Unencodable { path: path.to_owned(), reason };
+    if samples.is_empty() || samples.len() != 3 * width as usize * height as usize {
+        return Err(unencodable(format!("the image is {width} × {height} pixels but holds {} bytes", samples.len())));
+    }
     let mut bytes = Vec::new();
     let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    image::ImageEncoder::write_image(encoder, &samples, image.width, image.height, image::ExtendedColorType::Rgb8)
+    image::ImageEncoder::write_image(encoder, samples, width, height, image::ExtendedColorType::Rgb8)
         .map_err(|error| unencodable(error.to_string()))?;
     write_bytes(path, &bytes)
+}
+
+/// The kinds of files that images are read from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageFormat {
+    /// OpenEXR.
+    Exr,
+    /// PNG.
+    Png,
+}
+
+/// Reads an image of either format, told apart by their first bytes, not by their names. An EXR is read as by [`read_exr`].
+///
+/// A PNG of any depth is taken as sRGB, whatever profile it carries, and decoded to linear values; grey is spread to all channels, alpha
+/// is ignored.
+///
+/// # Errors
+/// The file cannot be read, is of neither format or damaged, or an EXR without the channels R, G and B.
+pub fn read_image(path: &Path) -> Result<(Image, ImageFormat), ImageError> {
+    let malformed = |reason: String| ImageError::Format { path: path.to_owned(), reason };
+    let mut file = open(path)?;
+    let mut magic = [0; 4];
+    match file.read_exact(&mut magic).map(|()| magic) {
+        Ok(EXR_MAGIC) => Ok((read_exr(path)?, ImageFormat::Exr)),
+        Ok(PNG_MAGIC) => {
+            file.rewind().map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
+            Ok((decode_png(file).map_err(malformed)?, ImageFormat::Png))
+        }
+        _ => Err(malformed("it is neither an OpenEXR nor a PNG file".to_owned())),
+    }
 }
 
 /// Reads the channels R, G and B (half, float or integer) of the first layer that has them; others are ignored.
@@ -135,11 +173,7 @@ pub fn write_png(path: &Path, image: &Image) -> Result<(), ImageError> {
 pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
     let unreadable = |source| ImageError::Read { path: path.to_owned(), source };
     let malformed = |reason: String| ImageError::Format { path: path.to_owned(), reason };
-    let file = File::open(path).map_err(unreadable)?;
-    if !file.metadata().map_err(unreadable)?.is_file() {
-        return Err(malformed("it is not a file".to_owned()));
-    }
-    let mut file = BufReader::new(file);
+    let mut file = open(path)?;
     let mut magic = [0; 4];
     if file.read_exact(&mut magic).is_err() || magic != EXR_MAGIC {
         return Err(malformed("it is not an OpenEXR file".to_owned()));
@@ -181,6 +215,32 @@ pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
 
 /// The first four bytes of every EXR.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// The first four bytes of every PNG; there are four more.
+const PNG_MAGIC: [u8; 4] = *b"\x89PNG";
+
+fn open(path: &Path) -> Result<BufReader<File>, ImageError> {
+    let unreadable = |source| ImageError::Read { path: path.to_owned(), source };
+    let file = File::open(path).map_err(unreadable)?;
+    if !file.metadata().map_err(unreadable)?.is_file() {
+        return Err(ImageError::Format { path: path.to_owned(), reason: "it is not a file".to_owned() });
+    }
+    Ok(BufReader::new(file))
+}
+
+fn decode_png(file: BufReader<File>) -> Result<Image, String> {
+    let mut reader = image::ImageReader::with_format(file, image::ImageFormat::Png);
+    let mut limits = image::Limits::default();
+    // A decoder may take as much memory as the largest EXR does.
+    limits.max_alloc = Some((MOST_PIXELS * size_of::<Rgb>()) as u64);
+    reader.limits(limits);
+    let decoded = reader.decode().map_err(|error| error.to_string())?.into_rgb32f();
+    let mut image = Image::new(decoded.width(), decoded.height());
+    for (pixel, encoded) in image.pixels.iter_mut().zip(decoded.pixels()) {
+        *pixel = Rgb::from(encoded.0.map(srgb::decode));
+    }
+    Ok(image)
+}
 
 fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     write_atomically(path, |out| out.write_all(bytes))
@@ -285,11 +345,9 @@ fn sort_header(bytes: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// The sRGB transfer curve (IEC 61966-2-1), quantized to the nearest of 256 levels.
+/// The sRGB transfer curve, quantized to the nearest of 256 levels.
 fn srgb_byte(linear: f32) -> u8 {
-    let linear = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
+    (srgb::encode(linear) * 255.0).round() as u8
 }
 
 #[cfg(test)]
@@ -395,6 +453,37 @@ mod tests {
         let read = image::open(&path).unwrap().into_rgb8();
         assert_eq!(read.into_raw(), [0, 0, 0, 255, 188, 0]);
         assert!(write_png(&path, &Image::new(0, 3)).is_err());
+    }
+
+    #[test]
+    fn formats_are_told_apart_by_their_bytes() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("image");
+        let image = gradient();
+        write_exr(&path, &image, &[]).unwrap();
+        assert_eq!(read_image(&path).unwrap(), (image, ImageFormat::Exr));
+        image::RgbImage::from_raw(2, 1, vec![0, 255, 188, 128, 0, 0])
+            .unwrap()
+            .save_with_format(&path, image::ImageFormat::Png)
+            .unwrap();
+        let (image, format) = read_image(&path).unwrap();
+        assert_eq!((image.width, image.height, format), (2, 1, ImageFormat::Png));
+        let expected = [[0.0, 1.0, 0.502_886], [0.215_861, 0.0, 0.0]].map(Rgb::from);
+        for (pixel, expected) in image.pixels.iter().zip(expected) {
+            assert!((pixel - expected).abs().max_element() < 1e-6, "{pixel}");
+        }
+        // Sixteen bits, grey and alpha.
+        let deep = image::ImageBuffer::<image::LumaA<u16>, _>::from_raw(1, 1, vec![32_768, 7]).unwrap();
+        deep.save_with_format(&path, image::ImageFormat::Png).unwrap();
+        let (image, _) = read_image(&path).unwrap();
+        assert!((image.pixels[0] - Rgb::splat(0.214_050)).abs().max_element() < 1e-5, "{}", image.pixels[0]);
+        let whole = std::fs::read(&path).unwrap();
+        for length in [0, 3, 4, 20, whole.len() / 2] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(matches!(read_image(&path), Err(ImageError::Format { .. })), "{length}");
+        }
+        assert!(matches!(read_image(directory.path()), Err(ImageError::Format { .. })));
+        assert!(matches!(read_image(&directory.path().join("no")), Err(ImageError::Read { .. })));
     }
 
     #[test]

@@ -1,16 +1,91 @@
 //! `vdf compare`.
 
-use std::io::Write as _;
+use std::{io::Write as _, path::Path};
 
-use vdf_render::{RenderError, compare, read_exr};
+use anyhow::{Context as _, anyhow};
+use vdf_render::{
+    Image, ImageFormat, RenderError, check_writable,
+    metrics::{Comparison, DynamicRange, compare, write_error_map},
+    read_image,
+};
 
 use crate::{args::CompareArgs, failure::Failure};
 
 pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
-    let a = read_exr(&args.a).map_err(RenderError::from)?;
-    let b = read_exr(&args.b).map_err(RenderError::from)?;
-    let c = compare(&a, &b)?;
-    let identical = if c.identical { "yes" } else { "no" };
-    writeln!(std::io::stdout(), "mse: {:e}\nrelmse: {:e}\nidentical: {identical}", c.mse, c.rel_mse)?;
-    Ok(())
+    if let Some(map) = &args.map {
+        check_map(map, args)?;
+    }
+    let (a, b, range) = read(args)?;
+    let comparison = compare(&a, &b, range, args.ppd).map_err(|e| match e {
+        // The library knows no names of files.
+        RenderError::Uncomparable { image, reason } => {
+            let path = if image == "image" { &args.a } else { &args.b };
+            Failure::Usage(anyhow!("cannot compare: {} {reason}", path.display()))
+        }
+        e => e.into(),
+    })?;
+    if let Some(map) = &args.map {
+        write_error_map(map, &comparison.map).map_err(RenderError::from)?;
+    }
+    let stdout = &mut std::io::stdout();
+    if args.json {
+        let json = serde_json::to_string_pretty(&comparison).map_err(|e| Failure::Work(e.into()))?;
+        writeln!(stdout, "{json}")?;
+    } else {
+        write!(stdout, "{}", table(&comparison))?;
+    }
+    match args.max_relmse {
+        Some(max) if comparison.rel_mse > max => {
+            Err(Failure::Work(anyhow!("relmse {:e} is more than --max-relmse {max:e}", comparison.rel_mse)))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fails now if the map cannot be written, or would replace an image.
+fn check_map(map: &Path, args: &CompareArgs) -> Result<(), Failure> {
+    let canonical = |path: &Path| path.canonicalize().ok();
+    if canonical(map)
+        .is_some_and(|map| [&args.a, &args.b].into_iter().any(|image| canonical(image).as_ref() == Some(&map)))
+    {
+        return Err(Failure::Usage(anyhow!("--map {}: that is one of the images; give another name", map.display())));
+    }
+    check_writable(map).with_context(|| format!("cannot write {}", map.display())).map_err(Failure::Work)
+}
+
+fn read(args: &CompareArgs) -> Result<(Image, Image, DynamicRange), Failure> {
+    let (a, a_format) = read_image(&args.a).map_err(RenderError::from)?;
+    let (b, b_format) = read_image(&args.b).map_err(RenderError::from)?;
+    let range = match (a_format, b_format) {
+        (ImageFormat::Exr, ImageFormat::Exr) => DynamicRange::High,
+        (ImageFormat::Png, ImageFormat::Png) => DynamicRange::Low,
+        (ImageFormat::Exr, ImageFormat::Png) => return Err(mixed(&args.a, &args.b)),
+        (ImageFormat::Png, ImageFormat::Exr) => return Err(mixed(&args.b, &args.a)),
+    };
+    Ok((a, b, range))
+}
+
+fn mixed(exr: &Path, png: &Path) -> Failure {
+    Failure::Usage(anyhow!(
+        "{} is an EXR and {} a PNG, which is rounded and clamped: compare EXR with EXR or PNG with PNG (vdf render writes both)",
+        exr.display(),
+        png.display()
+    ))
+}
+
+/// One figure a line, aligned.
+fn table(c: &Comparison) -> String {
+    let ssim =
+        c.ssim.map_or_else(|| "none, an image of less than 11 x 11 pixels".to_owned(), |ssim| format!("{ssim:.6}"));
+    let mut lines = vec![
+        ("mse", format!("{:.6e}", c.mse)),
+        ("mae", format!("{:.6e}", c.mae)),
+        ("relmse", format!("{:.6e}", c.rel_mse)),
+        ("psnr", format!("{:.4} dB", c.psnr)),
+        ("ssim", ssim),
+        ("flip-ldr", format!("{:.6}", c.flip_ldr)),
+    ];
+    lines.extend(c.flip_hdr.map(|flip| ("flip-hdr", format!("{flip:.6}"))));
+    lines.push(("identical", if c.identical { "yes" } else { "no" }.to_owned()));
+    lines.into_iter().map(|(name, value)| format!("{:<11}{value}\n", format!("{name}:"))).collect()
 }
