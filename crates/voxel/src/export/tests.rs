@@ -101,7 +101,10 @@ impl Surface {
 }
 
 fn check(grid: &VoxelGrid, set: &VoxelSet) {
-    let surface = read(grid, &written(|out| write_obj(grid, set, out)));
+    let obj = written(|out| write_obj(grid, set, out));
+    let surface = read(grid, &obj);
+    // The reader drops vertices that no face uses.
+    assert_eq!(obj.lines().filter(|l| l.starts_with("v ")).count(), surface.points.len(), "a vertex is not used");
     surface.assert_closed();
     assert_eq!(&surface.inside(set.resolution()), set);
     assert_eq!(surface.volume(), set.count() as i64);
