@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec3, dvec3};
 use vdf::render::{
-    Acceleration, Counters, Method, Proofs, ProofsVisitor, Sampler, ShadowQuery, Visibility, World,
+    Acceleration, Counters, Method, Proofs, ProofsVisitor, QueryKind, Sampler, ShadowQuery, Visibility, World,
     geometry::Segment,
     scene::{Emitter, LoadOptions, Scene, builtin},
 };
@@ -26,7 +26,7 @@ fn queries(world: &World, light: DVec3) -> Vec<ShadowQuery> {
         .map(|i| {
             let mut s = Sampler::new(1, i, 0, 0);
             let from = min + (max - min) * dvec3(s.next_1d(), s.next_1d(), s.next_1d());
-            ShadowQuery { from, to: light, emitter: 0, spatial: true }
+            ShadowQuery { from, to: light, emitter: 0, kind: QueryKind::Spatial }
         })
         .collect()
 }
@@ -73,7 +73,7 @@ fn bench(c: &mut Criterion) {
     let Some(Emitter::Point { position, .. }) = scene.emitters.first() else { panic!("cbox_vol2 has a point light") };
     let queries = queries(&world, *position);
     let build = |method| {
-        Acceleration::build(method, &world.triangles, world.bounds, &scene.emitters, VOXEL, MAX_VOXELS)
+        Acceleration::build(method, &world.triangles, world.bounds, &scene.light_shapes(), VOXEL, MAX_VOXELS)
             .expect("a sound grid")
             .0
     };

@@ -2,40 +2,87 @@
 
 mod common;
 
-use common::{all_methods, builtin, options, rendered};
-use vdf::render::{IntegratorKind, RenderOptions, Rgb, scene::PixelRect};
+use common::{all_methods, builtin, ceiling_light, options, rendered};
+use vdf::render::{
+    IntegratorKind, Method, RenderOptions, Rgb,
+    scene::{PixelRect, Scene},
+};
 
 fn bits(pixels: &[Rgb]) -> Vec<[u32; 3]> {
     pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
+
+/// Renders with all methods and compares with `none`; both numbers of threads meet coarse and fine voxels, as their product would only
+/// take longer. Returns how often anything was proved, and how many images were compared.
+fn all_alike(name: &str, scene: &Scene, base: &RenderOptions, voxel_sizes: &[f64]) -> (usize, usize) {
+    let reference = rendered(scene, base);
+    assert!(reference.image.pixels.iter().any(|p| p.max_element() > 0.0), "{name} is black");
+    let (mut proving, mut images) = (0, 0);
+    for method in all_methods() {
+        for (&voxel_size, threads) in voxel_sizes.iter().zip([2, 1].into_iter().cycle()) {
+            let o = RenderOptions { method, voxel_size: Some(voxel_size), threads: Some(threads), ..base.clone() };
+            let r = rendered(scene, &o);
+            proving += usize::from(r.statistics.proved + r.statistics.on_light_proved > 0);
+            images += 1;
+            assert!(
+                bits(&r.image.pixels) == bits(&reference.image.pixels),
+                "{name} {:?} {method} voxel {voxel_size} threads {threads} differs from none",
+                base.integrator
+            );
+        }
+    }
+    (proving, images)
+}
+
+const INTEGRATORS: [IntegratorKind; 2] = [IntegratorKind::Volpath, IntegratorKind::Raymarch { samples_per_segment: 5 }];
 
 #[test]
 fn images_do_not_depend_on_method_voxel_size_or_threads() {
     let size = [("width", "24"), ("height", "20"), ("spp", "2")];
     for name in ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6"] {
         let scene = builtin(name, &size);
-        for integrator in [IntegratorKind::Volpath, IntegratorKind::Raymarch { samples_per_segment: 5 }] {
+        for integrator in INTEGRATORS {
             let base = RenderOptions { integrator, ..options() };
-            let reference = rendered(&scene, &base);
-            assert!(reference.image.pixels.iter().any(|p| p.max_element() > 0.0), "{name} is black");
-            for method in all_methods() {
-                // Both numbers of threads meet coarse and fine voxels; their product would only take longer.
-                for (voxel_size, threads) in [(4.0, 2), (8.0, 1), (16.0, 2), (100.0, 1)] {
-                    let o =
-                        RenderOptions { method, voxel_size: Some(voxel_size), threads: Some(threads), ..base.clone() };
-                    let r = rendered(&scene, &o);
-                    assert!(
-                        r.statistics.proved > 0 || voxel_size == 100.0,
-                        "{name} {method} {voxel_size}: nothing proved"
-                    );
-                    assert!(
-                        bits(&r.image.pixels) == bits(&reference.image.pixels),
-                        "{name} {integrator:?} {method} voxel {voxel_size} threads {threads} differs from none"
-                    );
-                }
-            }
+            let (proving, images) = all_alike(name, &scene, &base, &[4.0, 8.0, 16.0]);
+            assert_eq!(proving, images, "{name}: nothing proved");
+            all_alike(name, &scene, &base, &[100.0]);
         }
     }
+}
+
+#[test]
+fn generated_scenes_are_alike_with_all_methods() {
+    for name in ["san-miguel", "scape"] {
+        let scene = builtin(name, &[("width", "12"), ("height", "12"), ("spp", "1")]);
+        for integrator in INTEGRATORS {
+            let (proving, images) = all_alike(name, &scene, &RenderOptions { integrator, ..options() }, &[0.5]);
+            assert_eq!(proving, images, "{name}: nothing proved");
+        }
+    }
+}
+
+#[test]
+fn an_area_light_is_alike_with_all_methods() {
+    let scene = ceiling_light(&[("width", "24"), ("height", "20"), ("spp", "4")]);
+    for integrator in INTEGRATORS {
+        let (proving, images) =
+            all_alike("ceiling light", &scene, &RenderOptions { integrator, ..options() }, &[8.0, 16.0]);
+        // All methods but the plain ones, which have no neighbourhoods.
+        assert_eq!(proving * 3, images * 2);
+    }
+}
+
+/// A ray is cast for every flight that is not proved free: what is proved must change nothing, and save something.
+#[test]
+fn segment_first_saves_rays_and_nothing_else() {
+    let scene = builtin("cbox_vol4", &[("width", "24"), ("height", "20"), ("spp", "2")]);
+    let base = RenderOptions { method: Method::default(), voxel_size: Some(8.0), ..options() };
+    let first = rendered(&scene, &base);
+    let cast = rendered(&scene, &RenderOptions { segment_first: false, ..base });
+    assert!(bits(&first.image.pixels) == bits(&cast.image.pixels));
+    assert_eq!((cast.statistics.flights, cast.statistics.flights_proved), (0, 0));
+    assert_eq!(first.statistics.rays + first.statistics.flights_proved, cast.statistics.rays);
+    assert!(first.statistics.flights_proved * 2 > first.statistics.flights);
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Quiet, builtin, cuboid, empty_scene};
+use common::{Quiet, builtin, ceiling_light, cuboid, empty_scene};
 use glam::{DVec3, Vec3, dvec3, vec3};
 use vdf::render::{
     Rgb, Triangle,
@@ -44,6 +44,12 @@ fn builtin_scenes() {
     for name in ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6"] {
         much_proved(name, &sound(name, &builtin(name, &[]), &[4.0, 8.0, 16.0, 100.0]));
     }
+}
+
+/// The light is an occluder, and shares its voxels with the ceiling.
+#[test]
+fn a_light_in_the_ceiling() {
+    sound("ceiling light", &ceiling_light(&[]), &[4.0, 8.0, 16.0, 100.0]);
 }
 
 /// Slopes whose planes go through corners of voxels, exactly but for rounding: only the dilation decides on which side a corner is.

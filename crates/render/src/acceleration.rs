@@ -8,8 +8,7 @@ use vdf_distfield::{Amr, Dsz, Dual, ExtendedNeighbourhood, Ndf, Neighbourhood, S
 use vdf_voxel::{Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
-    FieldKind, Method, NeighbourhoodKind, Triangle,
-    scene::Emitter,
+    AreaNeighbourhood, FieldKind, Method, NeighbourhoodKind, Triangle,
     visibility::{FieldProofs, NeighbourhoodProofs, NoProofs, Proofs},
 };
 
@@ -42,6 +41,17 @@ pub trait ProofsVisitor {
     fn visit<P: Proofs>(self, proofs: &P) -> Self::Output;
 }
 
+/// Where an emitter is, as far as proofs are concerned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightShape<'a> {
+    /// A point.
+    Point(DVec3),
+    /// Some of the occluders.
+    Area(&'a [Triangle]),
+    /// Infinitely far away.
+    Infinite,
+}
+
 /// What was built, how large it is and how long it took.
 #[derive(Clone, Debug, Default)]
 pub struct BuildReport {
@@ -70,14 +80,14 @@ impl Acceleration {
         method: Method,
         triangles: &[Triangle],
         bounds: (DVec3, DVec3),
-        emitters: &[Emitter],
+        lights: &[LightShape],
         voxel_size: f64,
         max_voxels: u64,
     ) -> Result<(Self, BuildReport), VoxelError> {
         if method == Method::None {
             return Ok((
                 Self::None(NoProofs),
-                BuildReport { neighbourhoods: vec![None; emitters.len()], ..BuildReport::default() },
+                BuildReport { neighbourhoods: vec![None; lights.len()], ..BuildReport::default() },
             ));
         }
         let grid = VoxelGrid::covering(bounds.0, bounds.1, voxel_size, max_voxels)?;
@@ -91,15 +101,15 @@ impl Acceleration {
             voxels: r.voxel_count(),
             bytes: [occupied.bytes(), 0, 0],
             seconds: [start.elapsed().as_secs_f64(), 0.0, 0.0],
-            neighbourhoods: vec![None; emitters.len()],
+            neighbourhoods: vec![None; lights.len()],
         };
-        let builder = Builder { grid, occupied: &occupied, emitters, report: &mut report };
+        let builder = Builder { grid, occupied: &occupied, triangles, lights, report: &mut report };
         let acceleration = match method {
             Method::None => Self::None(NoProofs),
-            Method::Field(FieldKind::Ndf, kind) => Self::Ndf(builder.field(kind, Ndf::build)),
-            Method::Field(FieldKind::Amr, kind) => Self::Amr(builder.field(kind, Amr::build)),
-            Method::Field(FieldKind::Dsz, kind) => Self::Dsz(builder.field(kind, Dsz::build)),
-            Method::Field(FieldKind::Dual, kind) => Self::Dual(builder.field(kind, Dual::build)),
+            Method::Field(FieldKind::Ndf, kind) => Self::Ndf(builder.field(kind, Ndf::build)?),
+            Method::Field(FieldKind::Amr, kind) => Self::Amr(builder.field(kind, Amr::build)?),
+            Method::Field(FieldKind::Dsz, kind) => Self::Dsz(builder.field(kind, Dsz::build)?),
+            Method::Field(FieldKind::Dual, kind) => Self::Dual(builder.field(kind, Dual::build)?),
         };
         Ok((acceleration, report))
     }
@@ -130,47 +140,65 @@ impl<F: SafeZones> FieldAcceleration<F> {
 struct Builder<'a> {
     grid: VoxelGrid,
     occupied: &'a VoxelSet,
-    emitters: &'a [Emitter],
+    triangles: &'a [Triangle],
+    lights: &'a [LightShape<'a>],
     report: &'a mut BuildReport,
 }
 
 impl Builder<'_> {
-    fn field<F: SafeZones>(self, kind: NeighbourhoodKind, build: impl FnOnce(&VoxelSet) -> F) -> FieldAcceleration<F> {
+    fn field<F: SafeZones>(
+        self,
+        kind: NeighbourhoodKind,
+        build: impl FnOnce(&VoxelSet) -> F,
+    ) -> Result<FieldAcceleration<F>, VoxelError> {
         let start = Instant::now();
         let field = build(self.occupied);
         self.report.seconds[1] = start.elapsed().as_secs_f64();
         self.report.bytes[1] = field.bytes();
         let base = FieldProofs { grid: self.grid, field };
         let occupied = self.occupied;
-        match kind {
+        Ok(match kind {
             NeighbourhoodKind::None => FieldAcceleration::None(base),
             NeighbourhoodKind::Safe => FieldAcceleration::Safe(
-                self.neighbourhoods(base, |base, light| SafeNeighbourhood::new(&base.field, occupied, light)),
+                self.neighbourhoods(base, |base, light| SafeNeighbourhood::new(&base.field, occupied, light))?,
             ),
             NeighbourhoodKind::Extended => FieldAcceleration::Extended(
-                self.neighbourhoods(base, |_, light| ExtendedNeighbourhood::new(occupied, light.into())),
+                self.neighbourhoods(base, |_, light| ExtendedNeighbourhood::new(occupied, light.into()))?,
             ),
-        }
+        })
     }
 
-    /// One neighbourhood for each point emitter in the grid.
+    /// One neighbourhood for each point light in the grid, and one for each area light.
     fn neighbourhoods<F: SafeZones, N: Neighbourhood + Send>(
         self,
         base: FieldProofs<F>,
         build: impl Fn(&FieldProofs<F>, Voxel) -> N + Sync,
-    ) -> NeighbourhoodProofs<F, N> {
+    ) -> Result<NeighbourhoodProofs<F, N>, VoxelError> {
         let start = Instant::now();
         let neighbourhoods: Vec<_> = self
-            .emitters
+            .lights
             .par_iter()
-            .map(|e| match e {
-                Emitter::Point { position, .. } => self.grid.voxel_containing(*position).map(|v| build(&base, v)),
-                Emitter::Area { .. } | Emitter::Constant { .. } => None,
+            .map(|light| match light {
+                LightShape::Point(position) => self.grid.voxel_containing(*position).map(|v| build(&base, v)),
+                LightShape::Area(_) | LightShape::Infinite => None,
             })
             .collect();
+        let areas: Vec<_> = self
+            .lights
+            .iter()
+            .map(|light| match light {
+                LightShape::Area(light) => AreaNeighbourhood::build(&self.grid, self.triangles, light),
+                LightShape::Point(_) | LightShape::Infinite => Ok(None),
+            })
+            .collect::<Result<_, _>>()?;
+        let sizes = neighbourhoods.iter().zip(&areas).map(|(point, area)| {
+            let point = point.as_ref().map(|n| (n.count(), n.bytes()));
+            point.or_else(|| area.as_ref().map(|n| (n.count(), n.bytes())))
+        });
+        let sizes: Vec<Option<(usize, usize)>> = sizes.collect();
         self.report.seconds[2] = start.elapsed().as_secs_f64();
-        self.report.bytes[2] = neighbourhoods.iter().flatten().map(N::bytes).sum();
-        self.report.neighbourhoods = neighbourhoods.iter().map(|n| n.as_ref().map(N::count)).collect();
-        NeighbourhoodProofs { base, neighbourhoods }
+        self.report.bytes[2] = sizes.iter().flatten().map(|(_, bytes)| bytes).sum();
+        self.report.neighbourhoods = sizes.iter().map(|size| size.map(|(count, _)| count)).collect();
+        Ok(NeighbourhoodProofs { base, neighbourhoods, areas })
     }
 }

@@ -4,6 +4,7 @@
 //! distance field, safe neighbourhoods: the proofs) → an integrator, tile by tile → an image and its statistics.
 
 mod acceleration;
+mod area_light;
 mod atomic_file;
 mod error;
 mod frame;
@@ -29,7 +30,8 @@ mod visibility;
 mod voxels;
 mod world;
 
-pub use acceleration::{Acceleration, BuildReport, FieldAcceleration, ProofsVisitor};
+pub use acceleration::{Acceleration, BuildReport, FieldAcceleration, LightShape, ProofsVisitor};
+pub use area_light::AreaNeighbourhood;
 pub use atomic_file::{check_writable, write_atomically};
 pub use error::RenderError;
 pub use image::Image;
@@ -42,7 +44,9 @@ pub use options::{IntegratorKind, Progress, RenderOptions};
 pub use render::{Rendering, render};
 pub use sampler::Sampler;
 pub use statistics::{NeighbourhoodSize, Statistics};
-pub use visibility::{Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, Proofs, ShadowQuery, Visibility};
+pub use visibility::{
+    Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, Proofs, QueryKind, ShadowQuery, Visibility,
+};
 pub use voxels::SceneVoxels;
 pub use world::{SurfacePoint, World};
 

@@ -53,7 +53,7 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
         options.method,
         &world.triangles,
         world.bounds,
-        &scene.emitters,
+        &scene.light_shapes(),
         voxel_size,
         options.max_voxels,
     )?;

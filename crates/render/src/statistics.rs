@@ -65,6 +65,12 @@ pub struct Statistics {
     pub p_accelerated_given_spatial: Option<f64>,
     /// The unknown fraction, 1 − proved / spatial.
     pub unknown_fraction: Option<f64>,
+    /// Superficial queries of which only the end on an area light lies on an occluder.
+    pub on_light: u64,
+    /// Those of them that the neighbourhood of the light proved (4.4.1).
+    pub on_light_proved: u64,
+    /// on light proved / on light.
+    pub p_accelerated_on_light: Option<f64>,
     /// Rays cast for the first occluder.
     pub rays: u64,
     /// Free flights asked for a proof (segment-first).
@@ -145,6 +151,9 @@ impl Statistics {
             p_spatial: ratio(r.counters.spatial, r.counters.queries),
             p_accelerated_given_spatial: ratio(r.counters.proved, r.counters.spatial),
             unknown_fraction: ratio(r.counters.spatial - r.counters.proved, r.counters.spatial),
+            on_light: r.counters.on_light,
+            on_light_proved: r.counters.on_light_proved,
+            p_accelerated_on_light: ratio(r.counters.on_light_proved, r.counters.on_light),
             rays: r.counters.rays,
             flights: r.counters.flights,
             flights_proved: r.counters.flights_proved,
@@ -217,6 +226,15 @@ impl fmt::Display for Statistics {
             percent(self.p_accelerated_given_spatial),
             percent(self.unknown_fraction)
         )?;
+        if self.on_light > 0 {
+            write!(
+                f,
+                "\narea lights    {} superficial queries with only the light's end on an occluder, {} proved ({})",
+                self.on_light,
+                self.on_light_proved,
+                percent(self.p_accelerated_on_light)
+            )?;
+        }
         write!(f, "\nrays           {} cast", self.rays)?;
         if self.flights > 0 {
             write!(

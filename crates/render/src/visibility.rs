@@ -7,7 +7,10 @@ use glam::DVec3;
 use vdf_distfield::{Neighbourhood, SafeZones};
 use vdf_voxel::{Span, VoxelGrid};
 
-use crate::geometry::{Bvh, Hit, Segment};
+use crate::{
+    AreaNeighbourhood,
+    geometry::{Bvh, Hit, Segment},
+};
 
 /// What a method knows of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +30,13 @@ pub trait Proofs: Sync {
 
     /// What is known about the closed segment between any two points.
     fn answer_between(&self, a: DVec3, b: DVec3) -> Answer;
+
+    /// What is known about the closed segment `from`–`to`, where `to` is a sampled point of the area emitter `emitter`, which is an
+    /// occluder itself.
+    fn answer_on_light(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+        let _ = (emitter, from, to);
+        Answer::Unknown
+    }
 }
 
 /// The method `none`: every query goes to the hierarchy.
@@ -79,6 +89,8 @@ pub struct NeighbourhoodProofs<F, N> {
     pub base: FieldProofs<F>,
     /// For each emitter its neighbourhood, if it is a point inside the grid.
     pub neighbourhoods: Vec<Option<N>>,
+    /// For each emitter the neighbourhood of its voxel box, if it is an area light with few occluders close to it.
+    pub areas: Vec<Option<AreaNeighbourhood>>,
 }
 
 impl<F: SafeZones, N: Neighbourhood> Proofs for NeighbourhoodProofs<F, N> {
@@ -100,6 +112,14 @@ impl<F: SafeZones, N: Neighbourhood> Proofs for NeighbourhoodProofs<F, N> {
     fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
         self.base.answer_between(a, b)
     }
+
+    #[inline]
+    fn answer_on_light(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+        match &self.areas[emitter] {
+            Some(area) if area.proves(&self.base.grid, from, to) => Answer::Unoccluded,
+            _ => Answer::Unknown,
+        }
+    }
 }
 
 /// A question for [`Visibility::unoccluded`].
@@ -111,8 +131,19 @@ pub struct ShadowQuery {
     pub to: DVec3,
     /// Number of the emitter.
     pub emitter: usize,
-    /// Whether neither end lies on an occluder (Def. 2 in \[Houska2013\]); only such queries can be proved.
-    pub spatial: bool,
+    /// Which ends lie on an occluder.
+    pub kind: QueryKind,
+}
+
+/// Which ends of a query lie on an occluder (Def. 2 in \[Houska2013\]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QueryKind {
+    /// Neither end: what fields and neighbourhoods prove.
+    Spatial,
+    /// Only the end on an area light: superficial, but the light's own neighbourhood may prove it (4.4.1).
+    OnLight,
+    /// At least the end where light would arrive. Nothing is proved.
+    Superficial,
 }
 
 /// How many queries were asked and how they were answered.
@@ -124,6 +155,10 @@ pub struct Counters {
     pub spatial: u64,
     /// Those of the spatial ones that a proof answered.
     pub proved: u64,
+    /// Superficial queries of which only the end on an area light lies on an occluder.
+    pub on_light: u64,
+    /// Those of them that a proof answered.
+    pub on_light_proved: u64,
     /// Rays cast for the first occluder.
     pub rays: u64,
     /// Free flights that were asked for a proof: those that neither start nor end on an occluder.
@@ -141,6 +176,8 @@ impl std::ops::AddAssign for Counters {
         self.queries += other.queries;
         self.spatial += other.spatial;
         self.proved += other.proved;
+        self.on_light += other.on_light;
+        self.on_light_proved += other.on_light_proved;
         self.rays += other.rays;
         self.flights += other.flights;
         self.flights_proved += other.flights_proved;
@@ -191,15 +228,23 @@ impl<'a, P: Proofs> Visibility<'a, P> {
     #[inline]
     pub fn unoccluded(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
         counters.queries += 1;
-        if query.spatial {
-            counters.spatial += 1;
-            match self.proofs.answer(query.emitter, query.from, query.to) {
-                Answer::Unknown => {}
-                answer => {
-                    counters.proved += 1;
-                    return answer == Answer::Unoccluded;
-                }
+        let answer = match query.kind {
+            QueryKind::Spatial => {
+                let answer = self.proofs.answer(query.emitter, query.from, query.to);
+                counters.spatial += 1;
+                counters.proved += u64::from(answer != Answer::Unknown);
+                answer
             }
+            QueryKind::OnLight => {
+                let answer = self.proofs.answer_on_light(query.emitter, query.from, query.to);
+                counters.on_light += 1;
+                counters.on_light_proved += u64::from(answer != Answer::Unknown);
+                answer
+            }
+            QueryKind::Superficial => Answer::Unknown,
+        };
+        if answer != Answer::Unknown {
+            return answer == Answer::Unoccluded;
         }
         !self.bvh.occluded(&Segment::new(query.from, query.to))
     }

@@ -4,7 +4,7 @@
 
 use glam::{DVec3, Vec3, dvec3, vec3};
 use vdf_render::{
-    Acceleration, Answer, Lights, Method, Proofs, ProofsVisitor, Rgb, Triangle,
+    Acceleration, Answer, LightShape, Lights, Method, Proofs, ProofsVisitor, Rgb, Triangle,
     geometry::{Bvh, Segment, intersect_exact},
     scene::{self, Emitter, LoadOptions, Scene},
 };
@@ -43,10 +43,9 @@ fn answer(acceleration: &Acceleration, emitter: Option<usize>, from: DVec3, to: 
 impl Fixture {
     /// Grids cover `min` to `max`, in which the triangles have to lie.
     fn new(triangles: Vec<Triangle>, lights: &[DVec3], (min, max): (DVec3, DVec3), sizes: &[f64]) -> Self {
-        let emitters: Vec<_> =
-            lights.iter().map(|&position| Emitter::Point { position, intensity: Rgb::ONE }).collect();
+        let shapes: Vec<_> = lights.iter().map(|&position| LightShape::Point(position)).collect();
         let build = |method, size| {
-            let built = Acceleration::build(method, &triangles, (min, max), &emitters, size, 1 << 24);
+            let built = Acceleration::build(method, &triangles, (min, max), &shapes, size, 1 << 24);
             built.expect("a sound grid").0
         };
         let accelerations = sizes.iter().flat_map(|&s| Method::ALL.map(|m| build(m, s))).collect();

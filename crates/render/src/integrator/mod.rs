@@ -10,7 +10,7 @@ use crate::{
     frame::sample_cosine_hemisphere,
     geometry::{Hit, Segment},
     scene::{IntegratorSettings, MediumId, Phase},
-    visibility::{Counters, Proofs, ShadowQuery, Visibility},
+    visibility::{Counters, Proofs, QueryKind, ShadowQuery, Visibility},
     world::{SurfacePoint, World},
 };
 
@@ -176,8 +176,12 @@ impl<P: Proofs> Integrator<'_, P> {
         if value.max_element() <= 0.0 {
             return None;
         }
-        let spatial = matches!(vertex, Vertex::InMedium { .. }) && !light.on_surface;
-        let query = ShadowQuery { from: point, to: light.point, emitter: light.emitter, spatial };
+        let kind = match vertex {
+            Vertex::InMedium { .. } if light.on_surface => QueryKind::OnLight,
+            Vertex::InMedium { .. } => QueryKind::Spatial,
+            Vertex::OnSurface(_) => QueryKind::Superficial,
+        };
+        let query = ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind };
         if !self.visibility.unoccluded(&query, counters) {
             return None;
         }

@@ -2,7 +2,7 @@
 
 use glam::{DMat4, DVec3};
 
-use crate::{Rgb, Triangle};
+use crate::{LightShape, Rgb, Triangle};
 
 /// Index into [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,4 +172,17 @@ pub struct IntegratorSettings {
     pub max_depth: Option<u32>,
     /// Russian roulette starts beyond this depth.
     pub rr_depth: u32,
+}
+
+impl Scene {
+    /// Where the emitters are.
+    #[must_use]
+    pub fn light_shapes(&self) -> Vec<LightShape<'_>> {
+        let shape = |emitter: &Emitter| match *emitter {
+            Emitter::Point { position, .. } => LightShape::Point(position),
+            Emitter::Area { surface } => LightShape::Area(&self.surfaces[surface].triangles),
+            Emitter::Constant { .. } => LightShape::Infinite,
+        };
+        self.emitters.iter().map(shape).collect()
+    }
 }

@@ -133,9 +133,9 @@ fn verify_in_pool(
             if progress.cancelled() {
                 return Err(RenderError::Cancelled);
             }
-            let (triangles, emitters) = (&world.triangles, &scene.emitters);
+            let (triangles, lights) = (&world.triangles, &scene.light_shapes());
             let (acceleration, build) =
-                Acceleration::build(method, triangles, world.bounds, emitters, voxel_size, options.max_voxels)?;
+                Acceleration::build(method, triangles, world.bounds, lights, voxel_size, options.max_voxels)?;
             free_share = 1.0 - build.occupied as f64 / build.voxels as f64;
             methods.push(acceleration);
         }
@@ -197,11 +197,12 @@ impl<P: Proofs> Claimant for P {
         for (query, claims) in queries.iter().zip(claims) {
             let (p, q) = (query.segment.p, query.segment.q);
             // A query towards an emitter may have an answer of its own; the one for any two points has to be right as well.
-            for answer in [query.emitter.map(|e| self.answer(e, p, q)), Some(self.answer_between(p, q))] {
+            let of_emitter = query.emitter.map(|e| [self.answer(e, p, q), self.answer_on_light(e, p, q)]);
+            for answer in of_emitter.into_iter().flatten().chain([self.answer_between(p, q)]) {
                 match answer {
-                    Some(Answer::Unoccluded) => claims.unoccluded |= 1 << bit,
-                    Some(Answer::Occluded) => claims.occluded |= 1 << bit,
-                    Some(Answer::Unknown) | None => {}
+                    Answer::Unoccluded => claims.unoccluded |= 1 << bit,
+                    Answer::Occluded => claims.occluded |= 1 << bit,
+                    Answer::Unknown => {}
                 }
             }
         }

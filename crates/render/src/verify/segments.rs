@@ -5,14 +5,14 @@
 //! grid, one step of the last place beside all of these.
 //!
 //! *Definition.* Segment `index` of a class is a function of (seed, grid number, class, index), whatever the number of
-//! threads. In all classes but the first two, half of the segments end in a point light if there is one: those are what
+//! threads. In all classes but the first two, half of the segments end on a light if there is one: those are what
 //! safe neighbourhoods are asked about.
 
 use glam::DVec3;
 use serde::Serialize;
 use vdf_voxel::VoxelGrid;
 
-use crate::{Sampler, Triangle, World, geometry::Segment, scene::Emitter, scene::Scene};
+use crate::{LightShape, Sampler, Triangle, World, geometry::Segment, scene::Scene};
 
 /// Where the ends of a segment come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -93,7 +93,7 @@ const BESIDE: [f64; 8] = [0.0, 0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0];
 #[derive(Debug)]
 pub(super) struct Generator<'a> {
     world: &'a World,
-    /// Numbers and positions of the point emitters.
+    /// Numbers of the emitters, and places on them.
     lights: Vec<(usize, DVec3)>,
     grid: VoxelGrid,
     seed: u64,
@@ -103,11 +103,21 @@ pub(super) struct Generator<'a> {
 
 impl<'a> Generator<'a> {
     pub(super) fn new(scene: &Scene, world: &'a World, grid: VoxelGrid, seed: u64, number: u32) -> Self {
-        let point = |(i, e): (usize, &Emitter)| match e {
-            Emitter::Point { position, .. } => Some((i, *position)),
-            Emitter::Area { .. } | Emitter::Constant { .. } => None,
-        };
-        Self { world, lights: scene.emitters.iter().enumerate().filter_map(point).collect(), grid, seed, number }
+        let mut lights = Vec::new();
+        for (i, shape) in scene.light_shapes().iter().enumerate() {
+            match shape {
+                LightShape::Point(position) => lights.push((i, *position)),
+                // Vertices and middles, as sampled points are: on the light, or a little beside it.
+                LightShape::Area(triangles) => lights.extend(triangles.iter().take(16).flat_map(|t| {
+                    let [a, b, c] = t.vertices_f64();
+                    let normal = t.area_normal().normalize_or_zero() * grid.voxel_size();
+                    let beside = move |p: DVec3| [0.0, 1e-9, -1e-9, 1e-4].map(|d| (i, p + normal * d));
+                    [a, b, c, (a + b + c) / 3.0, (a + b) * 0.5].into_iter().flat_map(beside)
+                })),
+                LightShape::Infinite => {}
+            }
+        }
+        Self { world, lights, grid, seed, number }
     }
 
     /// Segment `index` of a class.
@@ -140,14 +150,12 @@ impl<'a> Generator<'a> {
         let from = self.uniform(draw);
         let (choice, u) = (draw.unit(), draw.0.next_2d());
         match self.world.lights.sample(from, choice, u) {
-            // Nobody asks a proof about an end on an occluder; but whatever it said would have to be right.
-            Some(light) if light.on_surface => between(from, light.point),
             Some(light) => Query { segment: Segment::new(from, light.point), emitter: Some(light.emitter) },
             None => between(from, self.uniform(draw)),
         }
     }
 
-    /// A point light in half of the cases.
+    /// A place on a light in half of the cases.
     fn light(&self, draw: &mut Draw) -> Option<(usize, DVec3)> {
         (!self.lights.is_empty() && draw.chance(0.5)).then(|| draw.of(&self.lights))
     }
