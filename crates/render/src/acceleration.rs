@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use vdf_distfield::{Amr, Dsz, Dual, ExtendedNeighbourhood, Ndf, Neighbourhood, SafeNeighbourhood, SafeZones};
+use vdf_distfield::{
+    Amr, Dsz, Dual, ExtendedNeighbourhood, FieldError, Ndf, Neighbourhood, SafeNeighbourhood, SafeZones,
+};
 use vdf_voxel::{Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
@@ -114,6 +116,21 @@ impl Acceleration {
         Ok((acceleration, report))
     }
 
+    /// Checks the field and the neighbourhoods of points against the occupied voxels that they were built from. The neighbourhoods of
+    /// area lights, built from fewer occluders, are not looked at.
+    ///
+    /// # Errors
+    /// The first value that is wrong.
+    pub fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
+        match self {
+            Self::None(_) => Ok(()),
+            Self::Ndf(field) => field.validate(occupied),
+            Self::Amr(field) => field.validate(occupied),
+            Self::Dsz(field) => field.validate(occupied),
+            Self::Dual(field) => field.validate(occupied),
+        }
+    }
+
     /// Gives the proofs to `visitor`.
     pub fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
         match self {
@@ -127,6 +144,21 @@ impl Acceleration {
 }
 
 impl<F: SafeZones> FieldAcceleration<F> {
+    fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
+        fn all<F: SafeZones, N: Neighbourhood>(
+            proofs: &NeighbourhoodProofs<F, N>,
+            occupied: &VoxelSet,
+        ) -> Result<(), FieldError> {
+            proofs.base.field.validate(occupied)?;
+            proofs.neighbourhoods.iter().flatten().try_for_each(|n| n.validate(occupied))
+        }
+        match self {
+            Self::None(proofs) => proofs.field.validate(occupied),
+            Self::Safe(proofs) => all(proofs, occupied),
+            Self::Extended(proofs) => all(proofs, occupied),
+        }
+    }
+
     fn accept<V: ProofsVisitor>(&self, visitor: V) -> V::Output {
         match self {
             Self::None(proofs) => visitor.visit(proofs),

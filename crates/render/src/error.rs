@@ -68,6 +68,9 @@ pub enum RenderError {
     /// The voxel size does not fit the scene.
     #[error(transparent)]
     Voxel(#[from] vdf_voxel::VoxelError),
+    /// A distance field or a neighbourhood is not what its occluders make it.
+    #[error(transparent)]
+    Field(#[from] vdf_distfield::FieldError),
     /// The threads could not be started.
     #[error("cannot start the rendering threads: {message}")]
     Threads {

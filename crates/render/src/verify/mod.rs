@@ -4,6 +4,9 @@
 //! blocks; each method is asked about a whole block; where any method proved something, the hierarchy is asked as well, and a loop
 //! over all triangles as often as that is affordable.
 //!
+//! First the structures themselves are validated: the occupied voxels against the triangles, the fields and neighbourhoods against the
+//! occupied voxels.
+//!
 //! *Guarantee.* None, only a bound: see [`Tally::bound`]. What is asked depends on the seed and the scene alone.
 //!
 //! *Cost.* About a microsecond a segment and thread.
@@ -18,7 +21,7 @@ mod tests;
 use std::{array, time::Instant};
 
 use rayon::prelude::*;
-use vdf_voxel::VoxelGrid;
+use vdf_voxel::{VoxelGrid, voxelize};
 
 use self::{
     oracle::{Oracle, Truth},
@@ -127,20 +130,23 @@ fn verify_in_pool(
     for (number, &voxel_size) in (0u32..).zip(&sizes) {
         progress.phase("distance fields");
         let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, voxel_size, options.max_voxels)?;
+        let vertices = world.triangles.par_iter().map(|t| t.vertices);
+        let occupied = voxelize(&grid, vertices.clone())?;
+        let excess = occupied.validate(&grid, vertices)?;
         let mut methods = Vec::new();
-        let mut free_share = 0.0;
         for &method in &options.methods {
             if progress.cancelled() {
                 return Err(RenderError::Cancelled);
             }
             let (triangles, lights) = (&world.triangles, &scene.light_shapes());
-            let (acceleration, build) =
+            let (acceleration, _) =
                 Acceleration::build(method, triangles, world.bounds, lights, voxel_size, options.max_voxels)?;
-            free_share = 1.0 - build.occupied as f64 / build.voxels as f64;
+            acceleration.validate(&occupied)?;
             methods.push(acceleration);
         }
         let r = grid.resolution();
-        grids.push(GridSummary { voxel_size, grid: [r.x, r.y, r.z], free_share });
+        let free_share = 1.0 - occupied.count() as f64 / r.voxel_count() as f64;
+        grids.push(GridSummary { voxel_size, grid: [r.x, r.y, r.z], free_share, excess });
 
         progress.phase("verifying");
         let start = Instant::now();
