@@ -4,7 +4,7 @@ mod common;
 
 use common::{all_methods, builtin, ceiling_light, options, rendered};
 use vdf::render::{
-    IntegratorKind, Method, RenderOptions, Rgb,
+    IntegratorKind, Method, RenderOptions, Rgb, TransmittanceEstimator,
     scene::{PixelRect, Scene},
 };
 
@@ -46,6 +46,33 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
             let (proving, images) = all_alike(name, &scene, &base, &[4.0, 8.0, 16.0]);
             assert_eq!(proving, images, "{name}: nothing proved");
             all_alike(name, &scene, &base, &[100.0]);
+        }
+    }
+}
+
+/// The 0/1 estimate of transmittance draws its random number whatever a method answers.
+#[test]
+fn images_of_analog_transmittance_do_not_depend_on_method() {
+    let scene = builtin("cbox_vol4", &[("width", "24"), ("height", "20"), ("spp", "2")]);
+    for integrator in INTEGRATORS {
+        let base = RenderOptions { integrator, transmittance: TransmittanceEstimator::Analog, ..options() };
+        let (proving, images) = all_alike("analog", &scene, &base, &[8.0]);
+        assert_eq!(proving, images, "nothing proved");
+    }
+}
+
+/// Whether a free flight is asked for a proof, is cast alone, or is cut off the whole ray's answer: the events are the same.
+#[test]
+fn images_do_not_depend_on_segment_first() {
+    for name in ["cbox_vol2", "cbox_vol4"] {
+        let scene = builtin(name, &[("width", "24"), ("height", "20"), ("spp", "4")]);
+        let reference = rendered(&scene, &RenderOptions { segment_first: false, ..options() });
+        for method in std::iter::once(Method::None).chain(all_methods()) {
+            for segment_first in [true, false] {
+                let o = RenderOptions { method, voxel_size: Some(8.0), segment_first, ..options() };
+                let r = rendered(&scene, &o);
+                assert!(bits(&r.image.pixels) == bits(&reference.image.pixels), "{name} {method} {segment_first}");
+            }
         }
     }
 }
