@@ -5,6 +5,8 @@
 
 mod acceleration;
 mod atomic_file;
+#[cfg(test)]
+mod chi_squared;
 mod error;
 mod frame;
 pub mod geometry;
