@@ -1,6 +1,8 @@
 //! What the end-to-end tests share: scenes made in code and a quiet way to render them.
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
+pub mod statistics;
+
 use vdf::render::{
     IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, TransmittanceEstimator, Triangle, render,
     scene::{

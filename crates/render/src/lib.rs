@@ -6,6 +6,8 @@
 mod acceleration;
 mod area_light;
 mod atomic_file;
+#[cfg(test)]
+mod chi_squared;
 mod error;
 mod frame;
 pub mod geometry;

@@ -4,6 +4,7 @@
 //! one medium each, found exactly (see [`crate::geometry`]). At a crossing the medium becomes the boundary's exterior if the
 //! segment leaves along the normal, else its interior. Where several boundaries are crossed at one place, exits come before
 //! entries, so that two media that touch need no reference to each other; places closer than the rounding of a hit are one.
+//! A boundary that is entered and left at one place is only touched there, or so thin that it does not count: the medium stays what it was.
 
 use std::ops::ControlFlow;
 
@@ -28,7 +29,7 @@ pub struct Media {
     /// For each of these triangles: the boundary it belongs to and its normal (of any length).
     faces: Vec<(usize, DVec3)>,
     /// Crossings closer than this are at one place, in world units: 2⁻⁴⁰ of the largest coordinate, far more than the rounding of `t`
-    /// and far less than a single-precision vertex can express.
+    /// and far less than the step of single precision there.
     one_place: f64,
 }
 
@@ -196,16 +197,21 @@ impl Media {
         let mut crossings = Crossings::new();
         self.bvh.visit_hits(segment, |hit| {
             let (boundary, normal) = self.faces[hit.triangle as usize];
-            crossings.push(Crossing { t: hit.t, enters: normal.dot(d) < 0.0, boundary });
+            crossings.push(Crossing { t: hit.t, enters: normal.dot(d) < 0.0, boundary, touched: false });
         });
         crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.boundary.cmp(&b.boundary)));
         let one_place = self.one_place / d.length();
         for place in crossings.chunk_by_mut(|a, b| b.t - a.t <= one_place) {
-            place.sort_unstable_by_key(|c| (c.enters, c.boundary));
             // Within a place the order is what counts; a common `t` keeps the intervals in order.
             let t = place[0].t;
-            place.iter_mut().for_each(|c| c.t = t);
+            place.sort_unstable_by_key(|c| (c.boundary, c.enters));
+            for of_one in place.chunk_by_mut(|a, b| a.boundary == b.boundary) {
+                let touched = of_one.first().map(|c| c.enters) != of_one.last().map(|c| c.enters);
+                of_one.iter_mut().for_each(|c| (c.t, c.touched) = (t, touched));
+            }
+            place.sort_unstable_by_key(|c| (c.enters, c.boundary));
         }
+        crossings.retain(|c| !c.touched);
         crossings
     }
 }
@@ -217,6 +223,8 @@ struct Crossing {
     t: f64,
     enters: bool,
     boundary: usize,
+    /// Whether its boundary is both entered and left at this place.
+    touched: bool,
 }
 
 /// On the stack for all but pathological segments: no allocation in the loops of the integrators.

@@ -7,25 +7,27 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use crate::{frame::direction_about, scene::Phase};
+use crate::{
+    frame::{direction_about, sample_sphere_about},
+    scene::Phase,
+};
 
 impl Phase {
     /// The density per steradian of scattering from propagation direction `from` into `to`; also the density with which
-    /// [`Phase::sample_direction`] draws `to`.
+    /// [`Phase::sample_direction`] draws `to`. Both are unit vectors up to rounding.
+    ///
+    /// Relative error: below 40·2⁻⁵³ for every g and angle, as `docs/numerics.md` derives.
     #[inline]
     #[must_use]
     pub fn pdf_direction(&self, from: DVec3, to: DVec3) -> f64 {
         match *self {
             Self::Isotropic => 0.25 / PI,
             Self::HenyeyGreenstein { g } => {
-                // 1 + g² − 2g cos θ = (1 − g)² + 2g(1 − cos θ); for g < 0 the mirrored form. Neither cancels.
-                let cos_theta = from.dot(to).clamp(-1.0, 1.0);
-                let d = if g >= 0.0 {
-                    (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos_theta)
-                } else {
-                    (1.0 + g) * (1.0 + g) - 2.0 * g * (1.0 + cos_theta)
-                };
-                0.25 / PI * (1.0 - g) * (1.0 + g) / (d * d.sqrt())
+                // 1 + g² − 2g cos θ = (1 − g)² + 2g(1 − cos θ) = (1 − g)² + g|to − from|²; for g < 0 mirrored. Nothing cancels: 1 − cos θ would,
+                // at a peak as narrow as 1 − |g|.
+                let (a, apart) = if g >= 0.0 { (g, to - from) } else { (-g, to + from) };
+                let d = (1.0 - a) * (1.0 - a) + a * apart.length_squared();
+                0.25 / PI * (1.0 - a) * (1.0 + a) / (d * d.sqrt())
             }
         }
     }
@@ -34,18 +36,22 @@ impl Phase {
     #[inline]
     #[must_use]
     pub fn sample_direction(&self, from: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
-        let s = 2.0 * u0 - 1.0;
-        let cos_theta = match *self {
-            Self::Isotropic => s,
+        match *self {
+            Self::Isotropic => sample_sphere_about(from, [u0, u1]),
             Self::HenyeyGreenstein { g } => {
-                // The textbook inversion multiplied out, so that nothing cancels for small g:
-                // cos θ = [2s + g(s² + 3) + 2g²s + g³(s² − 1)] / (2(1 + gs)²).
-                let denominator = 2.0 * (1.0 + g * s) * (1.0 + g * s);
-                let numerator = 2.0 * s + g * (s * s + 3.0 + g * (2.0 * s + g * (s * s - 1.0)));
-                (numerator / denominator).clamp(-1.0, 1.0)
+                let a = g.abs();
+                // From the back of the peak to its middle, so that both signs of g go the same way about the sphere.
+                let v = if g >= 0.0 { u0 } else { 1.0 - u0 };
+                // The textbook inversion, solved for the distances of the cosine from the peak and from its back. All
+                // terms are positive, so that nothing cancels, neither for small |g| nor for |g| near 1.
+                let e = (1.0 - a) + 2.0 * a * v;
+                let (narrow, wide) = ((1.0 - a) / e, (1.0 + a) / e);
+                let near = 2.0 * narrow * narrow * ((1.0 - v) * (1.0 + a * v));
+                let far = 2.0 * wide * wide * (v * ((1.0 - a) + a * v));
+                let cos_theta = if g >= 0.0 { 1.0 - near } else { near - 1.0 };
+                direction_about(from, cos_theta, (near * far).sqrt(), TAU * u1)
             }
-        };
-        direction_about(from, cos_theta, TAU * u1)
+        }
     }
 }
 

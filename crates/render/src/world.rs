@@ -92,7 +92,8 @@ impl World {
         let triangle = &self.triangles[hit.triangle as usize];
         let [a, b, c] = triangle.vertices_f64();
         let [wa, wb, wc] = hit.barycentric;
-        let normal = triangle.area_normal().normalize();
+        // Exact predicates can hit so thin a triangle that its rounded normal is zero.
+        let normal = triangle.area_normal().normalize_or(-direction);
         let data = &self.surfaces[self.surface_of_triangle[hit.triangle as usize] as usize];
         let front = direction.dot(normal) < 0.0;
         let normal = if front { normal } else { -normal };

@@ -51,7 +51,7 @@ impl<P: Proofs> Integrator<'_, P> {
         let width = -(-tau).exp_m1() / f64::from(samples);
         let mut sum = Rgb::ZERO;
         for k in 0..samples {
-            let depth = -(-(f64::from(k) + sampler.next_1d()) * width).ln_1p();
+            let depth = stratum_depth(k, width, sampler.next_1d());
             // Rounding may place the last sample an ulp beyond the end; it is worth nothing there.
             if let Flight::Collision { t, medium } = self.world.media.fly(free, ray.medium, depth) {
                 let m = self.world.media.medium(medium);
@@ -60,5 +60,50 @@ impl<P: Proofs> Integrator<'_, P> {
             }
         }
         sum * to_f32(width)
+    }
+}
+
+/// The optical depth of a sample in stratum `k`, uniform in transmittance, where each stratum takes `width` of it.
+#[inline]
+fn stratum_depth(k: u32, width: f64, u: f64) -> f64 {
+    -(-(f64::from(k) + u) * width).ln_1p()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chi_squared::assert_drawn_from;
+
+    /// In each stratum, for any optical depth, the density of the samples is that of exp(−τ): χ² over 32 cells whose borders lie at equal
+    /// steps of *depth*, so that the inversion is not tested with itself. Where exp(−τ) leaves single cells nearly empty the
+    /// borders are those of 1 − exp(−τ).
+    #[test]
+    fn strata_are_drawn_with_the_transmittance() {
+        const CELLS: usize = 32;
+        for tau in [1e-12, 1e-6, 0.1, 1.0, 3.0, 30.0, 1e4_f64] {
+            for n in [1_u32, 2, 7] {
+                let width = -(-tau).exp_m1() / f64::from(n);
+                for k in 0..n {
+                    let share = |depth: f64| -(-depth).exp_m1() / width - f64::from(k);
+                    let (first, last) = (stratum_depth(k, width, 0.0), stratum_depth(k, width, 1.0).min(tau));
+                    let even: Vec<_> =
+                        (0..=CELLS).map(|i| first + (last - first) * i as f64 / CELLS as f64).collect();
+                    let of_share = (0..=CELLS).map(|i| -(-(f64::from(k) + i as f64 / CELLS as f64) * width).ln_1p());
+                    let borders = if last - first < 4.0 { even } else { of_share.collect() };
+                    let mut probabilities: Vec<_> = borders.windows(2).map(|b| share(b[1]) - share(b[0])).collect();
+                    // Rounding of `share` for thin media; the relative error of each is far below that of 10⁵ samples.
+                    let sum: f64 = probabilities.iter().sum();
+                    assert!((sum - 1.0).abs() < 1e-9, "τ = {tau}, n = {n}, k = {k}: {sum}");
+                    probabilities.iter_mut().for_each(|p| *p /= sum);
+                    let mut cells = [0; CELLS];
+                    for i in 0..20_000 {
+                        let depth = stratum_depth(k, width, Sampler::new(5, i, k, n).next_1d());
+                        assert!((0.0..=tau * (1.0 + 1e-15)).contains(&depth), "τ = {tau}, n = {n}, k = {k}: {depth}");
+                        cells[borders.partition_point(|&b| b <= depth).clamp(1, CELLS) - 1] += 1;
+                    }
+                    assert_drawn_from(&format!("τ = {tau}, n = {n}, k = {k}"), &cells, &probabilities);
+                }
+            }
+        }
     }
 }
