@@ -3,7 +3,7 @@
 mod common;
 
 use common::{all_methods, builtin, options, rendered};
-use vdf::render::{IntegratorKind, RenderOptions, Rgb, scene::PixelRect};
+use vdf::render::{IntegratorKind, RenderOptions, Rgb, TransmittanceEstimator, scene::PixelRect};
 
 fn bits(pixels: &[Rgb]) -> Vec<[u32; 3]> {
     pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
@@ -33,6 +33,40 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
                         "{name} {integrator:?} {method} voxel {voxel_size} threads {threads} differs from none"
                     );
                 }
+            }
+        }
+    }
+}
+
+/// The 0/1 estimate of transmittance draws its random number whatever a method answers.
+#[test]
+fn images_of_analog_transmittance_do_not_depend_on_method() {
+    let scene = builtin("cbox_vol4", &[("width", "24"), ("height", "20"), ("spp", "2")]);
+    for integrator in [IntegratorKind::Volpath, IntegratorKind::Raymarch { samples_per_segment: 5 }] {
+        let base = RenderOptions { integrator, transmittance: TransmittanceEstimator::Analog, ..options() };
+        let reference = rendered(&scene, &base);
+        for method in all_methods() {
+            let r = rendered(&scene, &RenderOptions { method, voxel_size: Some(8.0), ..base.clone() });
+            assert!(r.statistics.proved > 0, "{method}: nothing proved");
+            assert!(
+                bits(&r.image.pixels) == bits(&reference.image.pixels),
+                "{integrator:?} {method} differs from none"
+            );
+        }
+    }
+}
+
+/// Whether a free flight is asked for a proof, is cast alone, or is cut off the whole ray's answer: the events are the same.
+#[test]
+fn images_do_not_depend_on_segment_first() {
+    for name in ["cbox_vol2", "cbox_vol4"] {
+        let scene = builtin(name, &[("width", "24"), ("height", "20"), ("spp", "4")]);
+        let reference = rendered(&scene, &RenderOptions { segment_first: false, ..options() });
+        for method in std::iter::once(vdf::render::Method::None).chain(all_methods()) {
+            for segment_first in [true, false] {
+                let o = RenderOptions { method, voxel_size: Some(8.0), segment_first, ..options() };
+                let r = rendered(&scene, &o);
+                assert!(bits(&r.image.pixels) == bits(&reference.image.pixels), "{name} {method} {segment_first}");
             }
         }
     }

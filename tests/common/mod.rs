@@ -2,7 +2,7 @@
 #![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
 
 use vdf::render::{
-    IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, Triangle, render,
+    IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, TransmittanceEstimator, Triangle, render,
     scene::{
         self, Boundary, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
         ReconstructionFilter, Scene,
@@ -29,6 +29,7 @@ pub fn options() -> RenderOptions {
         method: Method::None,
         voxel_size: None,
         integrator: IntegratorKind::Volpath,
+        transmittance: TransmittanceEstimator::Analytic,
         spp: None,
         seed: None,
         threads: Some(2),

@@ -50,6 +50,9 @@ pub(crate) struct RenderArgs {
     /// Samples on each path segment, for raymarch only [default: 7]
     #[arg(long, value_name = "N")]
     pub(crate) samples_per_segment: Option<u32>,
+    /// Transmittance towards emitters: exp(-tau), or the 0/1 estimate of other renderers, noisier and of the same mean
+    #[arg(long, value_enum, default_value_t = TransmittanceName::Analytic)]
+    pub(crate) transmittance: TransmittanceName,
     /// Cast a ray for every free flight instead of asking for a proof first (volpath); the image is the same
     #[arg(long)]
     pub(crate) no_segment_first: bool,
@@ -80,6 +83,12 @@ pub(crate) struct RenderArgs {
 pub(crate) enum IntegratorName {
     Volpath,
     Raymarch,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TransmittanceName {
+    Analytic,
+    Analog,
 }
 
 /// List the built-in scenes, or write one to disk.

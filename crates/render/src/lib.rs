@@ -38,7 +38,7 @@ pub use lights::{LightSample, Lights};
 pub use media::{Flight, Media};
 pub use mesh::Triangle;
 pub use method::{FieldKind, Method, NeighbourhoodKind, UnknownMethod};
-pub use options::{IntegratorKind, Progress, RenderOptions};
+pub use options::{IntegratorKind, Progress, RenderOptions, TransmittanceEstimator};
 pub use render::{Rendering, render};
 pub use sampler::Sampler;
 pub use statistics::{NeighbourhoodSize, Statistics};

@@ -19,6 +19,28 @@ pub enum IntegratorKind {
     },
 }
 
+/// The estimator of transmittance towards emitters; both have the same mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TransmittanceEstimator {
+    /// exp(−τ), without variance.
+    #[default]
+    Analytic,
+    /// 1 if a random free flight reaches the emitter, else 0: what the `volpath` of Mitsuba 3 and pbrt-v4 make of a homogeneous
+    /// medium. One more random number for each emitter sample; there to compare with these renderers like for like.
+    Analog,
+}
+
+impl TransmittanceEstimator {
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Analytic => "analytic",
+            Self::Analog => "analog",
+        }
+    }
+}
+
 /// Options of [`crate::render()`]; `None` leaves it to the scene or to the default named.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
@@ -28,6 +50,8 @@ pub struct RenderOptions {
     pub voxel_size: Option<f64>,
     /// Integrator.
     pub integrator: IntegratorKind,
+    /// Estimator of transmittance towards emitters.
+    pub transmittance: TransmittanceEstimator,
     /// Samples per pixel; by default the scene's.
     pub spp: Option<u32>,
     /// Seed of the random numbers; by default the scene's.
@@ -43,12 +67,13 @@ pub struct RenderOptions {
 }
 
 impl Default for RenderOptions {
-    /// `volpath` with `amr-sn`, at most 2²⁹ voxels (4 GiB), all else from the scene.
+    /// `volpath` with `amr-sn` and analytic transmittance, at most 2²⁹ voxels (4 GiB), all else from the scene.
     fn default() -> Self {
         Self {
             method: Method::default(),
             voxel_size: None,
             integrator: IntegratorKind::Volpath,
+            transmittance: TransmittanceEstimator::Analytic,
             spp: None,
             seed: None,
             threads: None,

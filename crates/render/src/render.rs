@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::{
     Acceleration, Image, IntegratorKind, Progress, ProofsVisitor, RenderError, RenderOptions, Rgb, Sampler, Statistics,
-    World,
+    TransmittanceEstimator, World,
     integrator::{Integrator, PathRay},
     options::{default_voxel_size, on_threads},
     scene::{PixelRect, Scene},
@@ -64,6 +64,7 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
         scene,
         world: &world,
         kind: options.integrator,
+        transmittance: options.transmittance,
         crop: options.crop.unwrap_or(scene.film.crop),
         spp: options.spp.unwrap_or(scene.sample_count),
         seed: options.seed.unwrap_or(scene.seed),
@@ -92,6 +93,7 @@ struct Job<'a> {
     scene: &'a Scene,
     world: &'a World,
     kind: IntegratorKind,
+    transmittance: TransmittanceEstimator,
     crop: PixelRect,
     spp: u32,
     seed: u64,
@@ -158,6 +160,7 @@ impl Job<'_> {
             world: self.world,
             visibility: Visibility::new(&self.world.bvh, proofs, self.segment_first),
             settings: self.scene.integrator,
+            transmittance: self.transmittance,
         };
         let mut counters = Counters::default();
         let pixels = (tile.y0..tile.y1)

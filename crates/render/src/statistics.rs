@@ -41,6 +41,8 @@ pub struct Statistics {
     pub integrator: &'static str,
     /// Samples on each path segment, for `raymarch`.
     pub samples_per_segment: Option<u32>,
+    /// Estimator of transmittance towards emitters.
+    pub transmittance: &'static str,
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
     /// Samples per pixel.
@@ -133,6 +135,7 @@ impl Statistics {
             t_render: r.t_render,
             integrator,
             samples_per_segment,
+            transmittance: r.options.transmittance.name(),
             size: r.size,
             spp: r.spp,
             seed: r.seed,
@@ -180,7 +183,7 @@ impl fmt::Display for Statistics {
         if let Some(n) = self.samples_per_segment {
             write!(f, " with {n} samples per segment")?;
         }
-        writeln!(f, ", {} threads", self.threads)?;
+        writeln!(f, ", {} transmittance, {} threads", self.transmittance, self.threads)?;
         write!(f, "method         {}", self.method)?;
         if let (Some([x, y, z]), Some(size)) = (self.grid, self.voxel_size) {
             writeln!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;

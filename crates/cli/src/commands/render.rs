@@ -8,13 +8,14 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
 use vdf_render::{
-    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, check_writable, render,
+    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, TransmittanceEstimator,
+    check_writable, render,
     scene::{DEFAULT_SCENE, LoadOptions, Scene, builtin, builtin_names},
     write_atomically, write_exr, write_png,
 };
 
 use crate::{
-    args::{IntegratorName, RenderArgs},
+    args::{IntegratorName, RenderArgs, TransmittanceName},
     failure::{Failure, say},
     progress::Reporter,
 };
@@ -64,6 +65,10 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         method: args.method,
         voxel_size: args.voxel,
         integrator,
+        transmittance: match args.transmittance {
+            TransmittanceName::Analytic => TransmittanceEstimator::Analytic,
+            TransmittanceName::Analog => TransmittanceEstimator::Analog,
+        },
         spp: args.spp,
         seed: args.seed,
         threads: args.threads,
@@ -147,6 +152,7 @@ fn attributes(s: &Statistics, name: &str) -> Vec<(&'static str, AttributeValue)>
         ("vdf.scene", name.into()),
         ("vdf.method", s.method.into()),
         ("vdf.integrator", s.integrator.into()),
+        ("vdf.transmittance", s.transmittance.into()),
         ("vdf.samplesPerPixel", i64::from(s.spp).into()),
         ("vdf.seed", s.seed.to_string().into()),
         ("vdf.queries", count(s.queries)),

@@ -82,6 +82,26 @@ fn crop_and_raymarch() {
 }
 
 #[test]
+fn transmittance_is_analytic_unless_asked_for() {
+    let sandbox = Sandbox::new();
+    for (name, args) in [
+        ("default", &[][..]),
+        ("analytic", &["--transmittance", "analytic"]),
+        ("analog", &["--transmittance", "analog"]),
+    ] {
+        let used = if name == "analog" { "analog" } else { "analytic" };
+        let (exr, json) = (format!("{name}.exr"), format!("{name}.json"));
+        let outcome = sandbox.render(&[args, &["-o", &exr, "--stats", &json]].concat());
+        assert!(outcome.stdout.contains(&format!("volpath, {used} transmittance")), "{}", outcome.stdout);
+        let json: serde_json::Value = serde_json::from_slice(&sandbox.read(&json)).unwrap();
+        assert_eq!(json["transmittance"], used);
+    }
+    let png = |name: &str| sandbox.read(&format!("{name}.png"));
+    assert_eq!(png("default"), png("analytic"));
+    assert_ne!(png("default"), png("analog"));
+}
+
+#[test]
 fn failure_keeps_old_results() {
     let sandbox = Sandbox::new();
     sandbox.write("fog.exr", "old");

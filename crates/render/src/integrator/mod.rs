@@ -6,7 +6,7 @@ mod volpath;
 use glam::DVec3;
 
 use crate::{
-    Rgb, Sampler,
+    Rgb, Sampler, TransmittanceEstimator,
     frame::sample_cosine_hemisphere,
     geometry::{Hit, Segment},
     scene::{IntegratorSettings, MediumId, Phase},
@@ -20,6 +20,7 @@ pub(crate) struct Integrator<'a, P> {
     pub(crate) world: &'a World,
     pub(crate) visibility: Visibility<'a, P>,
     pub(crate) settings: IntegratorSettings,
+    pub(crate) transmittance: TransmittanceEstimator,
 }
 
 /// A ray on its way: from where, whereto, in which medium it starts, and what its light is worth.
@@ -170,6 +171,11 @@ impl<P: Proofs> Integrator<'_, P> {
         counters: &mut Counters,
     ) -> Option<(Rgb, f64, f64)> {
         let (u_emitter, u) = (sampler.next_1d(), sampler.next_2d());
+        // Drawn even if no one will ask for it: how many numbers an event takes depends on nothing.
+        let flight = match self.transmittance {
+            TransmittanceEstimator::Analytic => None,
+            TransmittanceEstimator::Analog => Some(sample_free_flight(sampler)),
+        };
         let light = self.world.lights.sample(point, u_emitter, u)?;
         let (value, pdf) = vertex.eval(light.direction);
         let value = value * light.weight;
@@ -181,8 +187,12 @@ impl<P: Proofs> Integrator<'_, P> {
         if !self.visibility.unoccluded(&query, counters) {
             return None;
         }
-        let transmittance = self.world.media.transmittance(&Segment::new(point, light.point), medium);
-        Some((value * to_f32(transmittance), light.pdf, pdf))
+        let tau = self.world.media.optical_depth(&Segment::new(point, light.point), medium);
+        let transmittance = match flight {
+            None => to_f32((-tau).exp()),
+            Some(flight) => f32::from(flight >= tau),
+        };
+        Some((value * transmittance, light.pdf, pdf))
     }
 
     /// Light of the background that a ray meets when it leaves the scene, weighted against emitter sampling.
@@ -233,6 +243,13 @@ impl Vertex {
             }
         }
     }
+}
+
+/// The optical depth of a free flight: it reaches τ with probability exp(−τ).
+#[inline]
+fn sample_free_flight(sampler: &mut Sampler) -> f64 {
+    // −ln(1 − ξ); ξ < 1, so it is finite.
+    -(-sampler.next_1d()).ln_1p()
 }
 
 /// The weight of a sample drawn with density `pdf` where another strategy has density `other` (power heuristic, β = 2 \[Veach1997\]).

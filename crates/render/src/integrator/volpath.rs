@@ -4,11 +4,12 @@
 //! Light is gathered at each event from one emitter sample and, by multiple importance sampling, from the scattered ray.
 //! The distance is drawn *before* a ray is cast (2.3, 2.4): if the flight is proved free no ray is cast at all, else one that is no longer
 //! than the flight. The events are the same either way.
-//! *Deviation from Mitsuba 3:* transmittance towards emitters is analytic, exp(−τ), not a 0/1 estimate; equal in the mean, less noisy.
+//! *Deviation from Mitsuba 3:* transmittance towards emitters is analytic, exp(−τ), unless [`crate::TransmittanceEstimator::Analog`] asks for the
+//! peer's 0/1 estimate; equal in the mean, less noisy.
 
 use glam::DVec3;
 
-use super::{Integrator, Origin, Path, PathRay, Vertex};
+use super::{Integrator, Origin, Path, PathRay, Vertex, sample_free_flight};
 use crate::{
     Rgb, Sampler,
     geometry::Hit,
@@ -30,8 +31,7 @@ impl<P: Proofs> Integrator<'_, P> {
     pub(crate) fn volpath(&self, ray: PathRay, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
-            // −ln(1 − ξ) is the optical depth of a free flight; ξ < 1, so it is finite.
-            let tau = -(-sampler.next_1d()).ln_1p();
+            let tau = sample_free_flight(sampler);
             match self.free_flight(&path, tau, counters) {
                 Event::Collision { point, medium } => {
                     path.depth += 1;

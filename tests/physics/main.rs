@@ -3,7 +3,9 @@
 //! Statistical comparisons allow 5 standard errors, the error being estimated from the image itself: a false alarm has a
 //! probability of 6·10⁻⁷ each. Seeds are fixed, so a test that passes keeps passing.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod estimators;
 
 use common::{add_fog, add_medium, cuboid, empty_scene, integrate, mean_and_error, options, rendered};
 use glam::{DVec3, dvec3, vec3};
