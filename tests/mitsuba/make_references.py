@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
 """Render the reference images of tests/mitsuba with Mitsuba 3.
 
-For every scene and depth below: many independent seeds of Mitsuba's `volpath`
-at 64x64, then per pixel the mean over the seeds and the variance *of that
-mean*, both summed in float64 and written as RGB float32 OpenEXR (ZIP):
+For every scene and depth below: many independent seeds of Mitsuba's `volpath`,
+then the mean over the seeds and the variance *of that mean*, both summed in
+float64 and written as RGB float32 OpenEXR (ZIP):
 
     references/SCENE_dDEPTH_mean.exr
     references/SCENE_dDEPTH_var.exr
 
-How they were made and the noise reached stand in references/references.json.
-See README.md for how to run it and how to compare against them.
+The built-in scenes (../../scenes) are kept pixel by pixel at 64x64, those of
+scenes/ as 8x8 means over blocks. A depth of -1 is no limit. How they were made
+and the noise reached stand in references/references.json. See README.md for
+how to run it and how to compare against them.
 """
 
 import argparse
@@ -18,6 +20,7 @@ import json
 import os
 import sys
 import time
+from typing import NamedTuple
 
 import drjit
 import mitsuba as mi
@@ -25,24 +28,70 @@ import numpy as np
 import OpenEXR
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-SCENES = os.path.normpath(os.path.join(HERE, "..", "..", "scenes"))
-SIZE = 64
-BLOCK = 8
+BUILT_IN = os.path.normpath(os.path.join(HERE, "..", "..", "scenes"))
+OWN = os.path.join(HERE, "scenes")
+GRID = 8  # blocks along each side
 
-# (scene, max_depth) -> (seeds, samples per pixel and seed). The median
-# relative standard error of an 8x8 block comes to about 0.3 % or less, for
-# cbox_vol4 at depth 8 to 0.9 %. Not above 1024 per seed, because Mitsuba sums
-# a seed in single precision.
-PLAN = {
-    ("cbox_vol2", 2): (128, 256),
-    ("cbox_vol3", 2): (128, 256),
-    ("cbox_vol4", 2): (128, 1024),
-    ("cbox_vol6", 2): (128, 256),
-    ("cbox_vol2", 8): (128, 256),
-    ("cbox_vol3", 8): (64, 256),
-    ("cbox_vol4", 8): (256, 1024),
-    ("cbox_vol6", 8): (64, 256),
-}
+
+class Case(NamedTuple):
+    scene: str
+    depth: int
+    seeds: int
+    spp: int  # of one seed
+    folder: str = OWN
+    # Columns and rows that are dropped on every side of the film.
+    border: int = 0
+    # With any other filter than a box, pixels share samples.
+    pixels_are_independent: bool = True
+
+    @property
+    def key(self):
+        return f"{self.scene}_d{self.depth}"
+
+    @property
+    def keeps_pixels(self):
+        return self.folder == BUILT_IN
+
+    @property
+    def rr_depth(self):
+        return self.depth if self.depth > 0 else 5
+
+    @property
+    def size(self):
+        """Of the film, for the scenes that have it as a parameter."""
+        return 64 if self.keeps_pixels else 48
+
+
+# The median relative standard error of a block comes to about 0.3 % or less,
+# for cbox_vol4 at depth 8 to 0.9 %. Not above 1024 samples per seed, because
+# Mitsuba sums a seed in single precision.
+PLAN = [
+    Case("cbox_vol2", 2, 128, 256, BUILT_IN),
+    Case("cbox_vol3", 2, 128, 256, BUILT_IN),
+    Case("cbox_vol4", 2, 128, 1024, BUILT_IN),
+    Case("cbox_vol6", 2, 128, 256, BUILT_IN),
+    Case("cbox_vol2", 8, 128, 256, BUILT_IN),
+    Case("cbox_vol3", 8, 64, 256, BUILT_IN),
+    Case("cbox_vol4", 8, 256, 1024, BUILT_IN),
+    Case("cbox_vol6", 8, 64, 256, BUILT_IN),
+    Case("area_light", 2, 128, 256),
+    Case("area_light", 8, 128, 256),
+    Case("sky", 3, 128, 256),
+    Case("sky", -1, 128, 256),
+    Case("forward", 3, 128, 256),
+    Case("forward", -1, 128, 256),
+    Case("backward", 2, 128, 256),
+    Case("backward", 8, 128, 256),
+    Case("outside", 2, 128, 256),
+    Case("outside", 8, 128, 256),
+    Case("touching", 3, 128, 256),
+    Case("touching", -1, 128, 256),
+    Case("nested", 2, 128, 256),
+    Case("nested", -1, 128, 256),
+    Case("rock", 2, 128, 256),
+    Case("rock", 8, 128, 256),
+    Case("cropped", 3, 128, 256, border=4, pixels_are_independent=False),
+]
 
 
 def write_exr(path, rgb):
@@ -53,29 +102,21 @@ def write_exr(path, rgb):
 
 
 def blocks(image):
-    """Mean over BLOCK x BLOCK pixels; leading axes are kept."""
-    n = SIZE // BLOCK
-    lead = image.shape[:-3]
-    return image.reshape(*lead, n, BLOCK, n, BLOCK, 3).mean((-4, -2))
+    """Mean over the blocks; leading axes are kept."""
+    *lead, height, width, _ = image.shape
+    return image.reshape(*lead, GRID, height // GRID, GRID, width // GRID, 3).mean((-4, -2))
 
 
-def render(name, depth, seeds, spp):
-    scene = mi.load_file(
-        os.path.join(SCENES, name + ".xml"),
-        width=SIZE, height=SIZE, spp=spp, max_depth=depth, rr_depth=depth,
-    )
-    images = np.empty((seeds, SIZE, SIZE, 3))  # float64
-    for i in range(seeds):
-        images[i] = np.array(mi.render(scene, seed=i + 1, spp=spp))
+def render(case, seeds, spp):
+    parameters = {"spp": spp, "max_depth": case.depth, "rr_depth": case.rr_depth}
+    if case.border == 0:
+        parameters |= {"width": case.size, "height": case.size}
+    scene = mi.load_file(os.path.join(case.folder, case.scene + ".xml"), **parameters)
+    rows, columns = (slice(case.border, n - case.border) for n in reversed(scene.sensors()[0].film().crop_size()))
+    images = np.stack([np.array(mi.render(scene, seed=i + 1, spp=spp))[rows, columns] for i in range(seeds)], dtype=np.float64)
     if not np.isfinite(images).all():
-        sys.exit(f"{name} depth {depth}: a pixel is not finite")
-    mean = images.mean(0)
-    var = images.var(0, ddof=1) / seeds
-    # The noise of a block from the blocks of the seeds themselves.
-    per_seed = blocks(images)
-    error = per_seed.std(0, ddof=1) / np.sqrt(seeds) / per_seed.mean(0)
-    whole = images.mean((1, 2, 3))
-    return mean, var, error, whole.std(ddof=1) / np.sqrt(seeds) / whole.mean()
+        sys.exit(f"{case.key}: a pixel is not finite")
+    return images
 
 
 def main():
@@ -87,7 +128,7 @@ def main():
     parser.add_argument("--spp", type=int, help="per seed, instead of the plan's")
     args = parser.parse_args()
 
-    known = [f"{name}_d{depth}" for name, depth in PLAN]
+    known = [case.key for case in PLAN]
     for wanted in args.only or []:
         if wanted not in known:
             parser.error(f"{wanted}: not one of {', '.join(known)}")
@@ -100,24 +141,38 @@ def main():
         with open(record_path) as f:
             record = json.load(f)
 
-    for (name, depth), (seeds, spp) in PLAN.items():
-        key = f"{name}_d{depth}"
-        if args.only and key not in args.only:
+    for case in PLAN:
+        if args.only and case.key not in args.only:
             continue
-        seeds, spp = args.seeds or seeds, args.spp or spp
+        seeds, spp = args.seeds or case.seeds, args.spp or case.spp
         start = time.time()
-        mean, var, error, whole = render(name, depth, seeds, spp)
-        write_exr(os.path.join(args.out, key + "_mean.exr"), mean)
-        write_exr(os.path.join(args.out, key + "_var.exr"), var)
-        record[key] = {
+        images = render(case, seeds, spp)
+        _, height, width, _ = images.shape
+        per_seed = blocks(images)
+        mean, var = images.mean(0), images.var(0, ddof=1) / seeds
+        if not case.keeps_pixels:
+            mean = blocks(mean)
+            if case.pixels_are_independent:
+                # The variance of a mean of n is the sum of theirs over n²: known better than from the blocks of the seeds.
+                var = blocks(var) * GRID * GRID / (width * height)
+            else:
+                var = per_seed.var(0, ddof=1) / seeds
+        write_exr(os.path.join(args.out, case.key + "_mean.exr"), mean)
+        write_exr(os.path.join(args.out, case.key + "_var.exr"), var)
+        # The noise of a block from the blocks of the seeds themselves; black ones have none.
+        lit = per_seed.mean(0) > 0
+        error = (per_seed.std(0, ddof=1) / np.sqrt(seeds))[lit] / per_seed.mean(0)[lit]
+        whole = images.mean((1, 2, 3))
+        whole = whole.std(ddof=1) / np.sqrt(seeds) / whole.mean()
+        record[case.key] = {
             "mitsuba": mi.__version__,
             "drjit": drjit.__version__,
             "variant": args.variant,
             "integrator": "volpath",
-            "width": SIZE,
-            "height": SIZE,
-            "max_depth": depth,
-            "rr_depth": depth,
+            "width": width,
+            "height": height,
+            "max_depth": case.depth,
+            "rr_depth": case.rr_depth,
             "seeds": f"1..{seeds}",
             "spp_per_seed": spp,
             "block_rel_se_median": float(f"{np.median(error):.3g}"),
@@ -131,9 +186,9 @@ def main():
         with open(record_path, "w") as f:
             json.dump(record, f, indent=2)
             f.write("\n")
-        r = record[key]
+        r = record[case.key]
         print(
-            f"{key}: {seeds} x {spp} spp, {r['seconds']} s; 8x8 block relative standard error: "
+            f"{case.key}: {seeds} x {spp} spp, {r['seconds']} s; block relative standard error: "
             f"median {np.median(error):.2%}, 95 % {r['block_rel_se_p95']:.2%}, max {r['block_rel_se_max']:.2%}; "
             f"image {whole:.3%}",
             flush=True,
