@@ -76,9 +76,9 @@ impl Method {
 }
 
 impl Default for Method {
-    /// `amr-sn`.
+    /// `amr-xsn`, which proves the most.
     fn default() -> Self {
-        Self::Field(FieldKind::Amr, NeighbourhoodKind::Safe)
+        Self::Field(FieldKind::Amr, NeighbourhoodKind::Extended)
     }
 }
 
@@ -113,6 +113,6 @@ mod tests {
             assert!(UnknownMethod.to_string().contains(m.name()));
         }
         assert_eq!("AMR".parse::<Method>(), Err(UnknownMethod));
-        assert_eq!(Method::default().name(), "amr-sn");
+        assert_eq!(Method::default().name(), "amr-xsn");
     }
 }

@@ -67,7 +67,7 @@ pub struct RenderOptions {
 }
 
 impl Default for RenderOptions {
-    /// `volpath` with `amr-sn` and analytic transmittance, at most 2²⁹ voxels (4 GiB), all else from the scene.
+    /// `volpath` with `amr-xsn` and analytic transmittance, at most 2²⁹ voxels (4 GiB), all else from the scene.
     fn default() -> Self {
         Self {
             method: Method::default(),
