@@ -3,7 +3,10 @@
 //! Medium boundaries never block; they only change the medium. A segment is cut at the boundaries it crosses into intervals of
 //! one medium each, found exactly (see [`crate::geometry`]). At a crossing the medium becomes the boundary's exterior if the
 //! segment leaves along the normal, else its interior. Where several boundaries are crossed at one place, exits come before
-//! entries, so that two media that touch need no reference to each other; places closer than the rounding of a hit are one.
+//! entries, so that two media that touch need no reference to each other; places closer than the rounding of a hit are one. A boundary
+//! that is both entered and left at one place is only touched, at an edge or a corner, and has no effect.
+//!
+//! Limits: at a corner of a body that is not convex a segment may meet faces of both kinds and yet go in; no random one does.
 
 use std::ops::ControlFlow;
 
@@ -196,16 +199,25 @@ impl Media {
         let mut crossings = Crossings::new();
         self.bvh.visit_hits(segment, |hit| {
             let (boundary, normal) = self.faces[hit.triangle as usize];
-            crossings.push(Crossing { t: hit.t, enters: normal.dot(d) < 0.0, boundary });
+            crossings.push(Crossing { t: hit.t, enters: normal.dot(d) < 0.0, touches: false, boundary });
         });
         crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.boundary.cmp(&b.boundary)));
         let one_place = self.one_place / d.length();
         for place in crossings.chunk_by_mut(|a, b| b.t - a.t <= one_place) {
-            place.sort_unstable_by_key(|c| (c.enters, c.boundary));
+            if place.len() == 1 {
+                continue;
+            }
             // Within a place the order is what counts; a common `t` keeps the intervals in order.
             let t = place[0].t;
             place.iter_mut().for_each(|c| c.t = t);
+            place.sort_unstable_by_key(|c| (c.boundary, c.enters));
+            for boundary in place.chunk_by_mut(|a, b| a.boundary == b.boundary) {
+                let touched = boundary.first().map(|c| c.enters) != boundary.last().map(|c| c.enters);
+                boundary.iter_mut().for_each(|c| c.touches = touched);
+            }
+            place.sort_unstable_by_key(|c| (c.enters, c.boundary));
         }
+        crossings.retain(|c| !c.touches);
         crossings
     }
 }
@@ -216,6 +228,8 @@ impl Media {
 struct Crossing {
     t: f64,
     enters: bool,
+    /// Whether the boundary is entered and left at this one place.
+    touches: bool,
     boundary: usize,
 }
 
