@@ -133,7 +133,8 @@ pub fn integrate(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
         let (fl, fr) = (f(0.5 * (a + m)), f(0.5 * (m + b)));
         let (left, right) = (simpson(fa, fl, fm, m - a), simpson(fm, fr, fb, b - m));
         let delta = left + right - whole;
-        if depth == 0 || delta.abs() <= 15.0 * tol {
+        // Where the tolerance is below the rounding of the value itself, nothing is gained by halving.
+        if depth == 0 || delta.abs() <= 15.0 * tol.max(f64::EPSILON * whole.abs()) {
             return left + right + delta / 15.0;
         }
         refine(f, a, m, fa, fl, fm, left, 0.5 * tol, depth - 1)

@@ -1,0 +1,73 @@
+//! `volpath` and `raymarch` agree where their models are one: single scattering before black surfaces, and any number of diffuse
+//! reflections through fog that only absorbs. No closed form, so the scene may be anything.
+
+use glam::{dvec3, vec3};
+use vdf::render::{
+    IntegratorKind, RenderOptions, Rgb, Triangle,
+    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Scene, Surface},
+};
+
+use crate::{
+    check::VOLPATH,
+    common::{cuboid, empty_scene, options, rendered},
+    fog::{Fog, add_fogs},
+};
+
+/// Three fogs, one of them around the camera, bodies in them, and three lights, none of them in fog (or the variance is infinite).
+fn scene(reflectance: f32, albedo: f32, density: f64) -> Scene {
+    let mut scene = empty_scene(32, 1, 0.6);
+    let fog = |min, max, sigma_t: f64, g| Fog {
+        min,
+        max,
+        sigma_t: density * sigma_t,
+        albedo,
+        phase: Phase::HenyeyGreenstein { g },
+    };
+    let fogs = [
+        fog(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.0, 1.0), 0.4, 0.5),
+        fog(vec3(-2.0, -1.5, 1.0), vec3(1.5, 1.5, 3.0), 1.2, -0.3),
+        fog(vec3(-1.0, -2.0, 3.5), vec3(2.5, 1.0, 5.0), 0.8, 0.0),
+    ];
+    add_fogs(&mut scene, &fogs);
+    let surface = |triangles, radiance| Surface {
+        triangles,
+        bsdf: Bsdf { front: Rgb::splat(reflectance), back: Rgb::splat(reflectance) },
+        radiance,
+    };
+    scene.surfaces.push(surface(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
+    scene.surfaces.push(surface(cuboid(vec3(0.3, -0.5, 2.6), vec3(0.9, 0.6, 4.0)), None));
+    let lamp = Triangle::new(vec3(-1.2, 1.9, 1.2), vec3(0.8, 1.9, 1.2), vec3(0.8, 1.9, 2.4));
+    scene.surfaces.push(surface(vec![lamp], Some(Rgb::splat(4.0))));
+    scene.emitters.push(Emitter::Area { surface: 2 });
+    scene.emitters.push(Emitter::Point { position: dvec3(2.0, 1.2, 0.6), intensity: Rgb::splat(5.0) });
+    scene.emitters.push(Emitter::Constant { radiance: Rgb::splat(0.3) });
+    scene
+}
+
+/// The mean over the image of the difference of two independent renders: 5 standard errors are a false alarm of 6·10⁻⁷.
+#[test]
+fn the_integrators_agree_where_their_models_do() {
+    let once = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
+    let often = IntegratorSettings { max_depth: None, rr_depth: 4 };
+    for (name, reflectance, albedo, density, settings) in [
+        ("black surfaces, scattered once", 0.0, 0.9, 1.0, once),
+        ("white surfaces, absorbing fog", 0.8, 0.0, 0.125, often),
+    ] {
+        let scene = Scene { integrator: settings, ..scene(reflectance, albedo, density) };
+        let image = |integrator, spp, seed| {
+            let o = RenderOptions { integrator, spp: Some(spp), seed: Some(seed), ..options() };
+            rendered(&scene, &o).image.pixels
+        };
+        let traced = image(VOLPATH, 512, 1);
+        let marched = image(IntegratorKind::Raymarch { samples_per_segment: 8 }, 96, 2);
+        let n = traced.len() as f64;
+        let differences: Vec<f64> = traced.iter().zip(&marched).map(|(a, b)| f64::from(a.x - b.x)).collect();
+        let mean = differences.iter().sum::<f64>() / n;
+        let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+        let level = traced.iter().map(|p| f64::from(p.x)).sum::<f64>() / n;
+        println!("{name}: volpath − raymarch = {:.1e} ± {:.1e} of the mean", mean / level, error / level);
+        assert!(mean.abs() < 5.0 * error, "{name}: {mean} ± {error}");
+        // Or the test would prove little.
+        assert!(error < 3e-3 * level, "{name}: too noisy, {error} of {level}");
+    }
+}

@@ -1,0 +1,111 @@
+//! The airlight integral: a point light scattered once into a ray. Fog with and without bounds, camera and light inside and outside.
+//!
+//! The light on the ray's axis has no finite integral; it is approached.
+
+use glam::{DVec3, Vec3, dvec3, vec3};
+use vdf::render::{
+    Rgb,
+    scene::{Emitter, IntegratorSettings, Phase, Scene},
+};
+
+use crate::{
+    check::{Check, INTEGRATORS, VOLPATH},
+    common::empty_scene,
+    fog::{Fog, add_fogs, single_scattering},
+};
+
+const PHASES: [Phase; 4] = [
+    Phase::Isotropic,
+    Phase::HenyeyGreenstein { g: 0.6 },
+    Phase::HenyeyGreenstein { g: -0.6 },
+    Phase::HenyeyGreenstein { g: 0.9 },
+];
+
+/// The camera at the origin looks along +Z through an angle that does not matter even for a light 10⁻³ off the axis.
+fn scene(fogs: &[Fog], light: DVec3) -> Scene {
+    let mut scene = empty_scene(32, 1, 1e-12);
+    scene.emitters.push(Emitter::Point { position: light, intensity: Rgb::splat(3.0) });
+    scene.integrator = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
+    add_fogs(&mut scene, fogs);
+    scene
+}
+
+fn compare(check: &mut Check, case: &str, fogs: &[Fog], light: DVec3) {
+    let spp = if check.is(VOLPATH) { 192 } else { 4 };
+    // Beyond optical depth 60 there is nothing left.
+    let thinnest = fogs.iter().map(|f| f.sigma_t).fold(f64::INFINITY, f64::min);
+    let end = if fogs[0].min.is_finite() { 100.0 } else { 60.0 / thinnest };
+    check.mean(case, &check.render(&scene(fogs, light), spp), single_scattering(fogs, light, 3.0, end));
+}
+
+#[test]
+fn in_unbounded_fog() {
+    for integrator in INTEGRATORS {
+        let mut check = Check::new("single scattering, unbounded", integrator);
+        for phase in PHASES {
+            for (sigma_t, light) in
+                [(0.7, dvec3(0.0, 0.4, 1.5)), (0.7, dvec3(0.5, -0.6, -1.0)), (4.0, dvec3(0.3, 0.0, 0.6))]
+            {
+                let fog = Fog::unbounded(sigma_t, 0.8, phase);
+                compare(&mut check, &format!("{phase:?}, σ_t {sigma_t}, light {light}"), &[fog], light);
+            }
+        }
+    }
+}
+
+#[test]
+fn in_boxes_of_fog() {
+    for integrator in INTEGRATORS {
+        let mut check = Check::new("single scattering, bounded", integrator);
+        for phase in PHASES {
+            let fog = |min: Vec3, max: Vec3, sigma_t| Fog { min, max, sigma_t, albedo: 0.8, phase };
+            let around = fog(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.5, 4.0), 0.7);
+            let ahead = fog(vec3(-1.0, -1.5, 1.0), vec3(1.0, 1.0, 4.0), 0.9);
+            let next = Fog { phase: Phase::Isotropic, ..fog(vec3(-2.0, -1.0, 4.0), vec3(1.0, 2.0, 5.0), 2.0) };
+            let after = fog(vec3(-1.0, -1.0, 5.5), vec3(1.0, 1.0, 7.0), 0.3);
+            let cases: [(&str, &[Fog], DVec3); 6] = [
+                ("both inside", &[around], dvec3(0.0, 0.4, 1.5)),
+                ("camera outside", &[ahead], dvec3(0.3, 0.4, 2.5)),
+                ("light outside", &[around], dvec3(0.0, 2.0, 1.5)),
+                ("both outside", &[ahead], dvec3(1.5, 0.5, 0.25)),
+                ("three media, light in the second", &[ahead, next, after], dvec3(-0.2, 0.6, 4.4)),
+                ("three media, light behind them", &[ahead, next, after], dvec3(0.4, 0.3, 8.0)),
+            ];
+            for (case, fogs, light) in cases {
+                compare(&mut check, &format!("{phase:?}, {case}"), fogs, light);
+            }
+        }
+    }
+}
+
+/// Thin fog is where ray marching must not lose digits (and where a path tracer finds next to nothing).
+#[test]
+fn in_thin_and_in_opaque_fog() {
+    let mut check = Check::new("single scattering, thin to opaque", INTEGRATORS[1]);
+    for sigma_t in [1e-12, 1e-6, 1e-3, 30.0, 1000.0] {
+        let fog = Fog {
+            min: vec3(-1.0, -1.0, 1.0),
+            max: vec3(1.0, 1.0, 4.0),
+            sigma_t,
+            albedo: 1.0,
+            phase: Phase::HenyeyGreenstein { g: 0.3 },
+        };
+        // Seen from the fog's near side, so that something is left of it.
+        compare(&mut check, &format!("σ_t {sigma_t}"), &[fog], dvec3(0.2, 0.1, 0.5));
+    }
+}
+
+/// As the light nears the axis the integral grows like 1/h and its estimators' relative variance like 1/h.
+#[test]
+fn with_the_light_near_the_axis() {
+    for integrator in INTEGRATORS {
+        let mut check = Check::new("single scattering, light near the axis", integrator);
+        for phase in [PHASES[0], PHASES[1]] {
+            for h in [0.1, 0.01, 0.001] {
+                let fog =
+                    Fog { min: vec3(-1.0, -1.0, 1.0), max: vec3(1.0, 1.0, 4.0), sigma_t: 0.7, albedo: 0.8, phase };
+                compare(&mut check, &format!("{phase:?}, h {h}"), &[fog], dvec3(h, 0.0, 2.2));
+            }
+        }
+    }
+}
