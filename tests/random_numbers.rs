@@ -188,8 +188,7 @@ fn ranks(x: &mut dyn Iterator<Item = u64>, n: u64) -> f64 {
         counts[(53 - rank).min(4)] += 1;
     }
     let product = |from: i32, to: i32| (from..=to).map(|k| 1.0 - 0.5_f64.powi(k)).product::<f64>();
-    let mut probabilities: Vec<_> =
-        (0..4).map(|d| 0.5_f64.powi(d * d) * product(d + 1, 60) / product(1, d)).collect();
+    let mut probabilities: Vec<_> = (0..4).map(|d| 0.5_f64.powi(d * d) * product(d + 1, 60) / product(1, d)).collect();
     probabilities.push(1.0 - probabilities.iter().sum::<f64>());
     chi_squared(&counts, &probabilities)
 }
@@ -221,7 +220,8 @@ fn every_bit_of_the_input_flips_every_bit_of_the_output() {
     let number = |[seed, x, y, sample, dimension]: [u64; 5]| {
         nth(Sampler::new(seed, x as u32, y as u32, sample as u32), dimension as u32)
     };
-    let inputs: Vec<_> = [64, 32, 32, 32, 6].iter().enumerate().flat_map(|(i, &n)| (0..n).map(move |b| (i, b))).collect();
+    let inputs: Vec<_> =
+        [64, 32, 32, 32, 6].iter().enumerate().flat_map(|(i, &n)| (0..n).map(move |b| (i, b))).collect();
     let p_values: Vec<_> = inputs
         .par_iter()
         .map(|&(field, bit)| {

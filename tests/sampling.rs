@@ -21,8 +21,8 @@ use vdf::render::{
 
 /// The whole range of mean cosines, with both ends, zero and its surroundings.
 const G: [f64; 19] = [
-    -0.999_999, -0.99, -0.9, -0.5, -0.1, -1e-3, -1e-6, -1e-12, -1e-300, 0.0, 1e-12, 1e-6, 9e-4, 1e-3, 0.3, 0.8, 0.95, 0.999,
-    0.999_999,
+    -0.999_999, -0.99, -0.9, -0.5, -0.1, -1e-3, -1e-6, -1e-12, -1e-300, 0.0, 1e-12, 1e-6, 9e-4, 1e-3, 0.3, 0.8, 0.95,
+    0.999, 0.999_999,
 ];
 
 /// All phase functions, with the mean cosine of each.
@@ -53,9 +53,8 @@ fn borders(g: f64) -> Vec<f64> {
 #[test]
 fn phase_functions_integrate_to_one_with_mean_cosine_g() {
     for (phase, g) in phases() {
-        let total = |f: &dyn Fn(f64) -> f64| {
-            borders(g).windows(2).map(|b| around_peak(phase, g, f, b[0], b[1])).sum::<f64>()
-        };
+        let total =
+            |f: &dyn Fn(f64) -> f64| borders(g).windows(2).map(|b| around_peak(phase, g, f, b[0], b[1])).sum::<f64>();
         let (sum, from_peak) = (total(&|_| 1.0), total(&|x| x));
         assert!((sum - 1.0).abs() < 1e-9, "{phase:?}: ∫p = {sum}");
         let expected = 1.0 - g.abs();
@@ -247,11 +246,13 @@ fn emitters_and_the_sky_are_drawn_evenly() {
                 assert!((s.point - FROM - s.direction * REACH).length() < 1e-9 * REACH);
                 assert!((f64::from(s.weight.x) * s.pdf / 0.5 - 1.0).abs() < 1e-6);
                 let azimuth = (s.direction.x.atan2(s.direction.z) / TAU + 1.0).fract();
-                let cell = ((0.5 + 0.5 * s.direction.y) * 16.0).min(15.0) as usize * 8 + ((azimuth * 8.0) as usize).min(7);
+                let cell =
+                    ((0.5 + 0.5 * s.direction.y) * 16.0).min(15.0) as usize * 8 + ((azimuth * 8.0) as usize).min(7);
                 sky[cell] += 1;
             }
             0 | 4 => {
-                let (position, intensity) = if s.emitter == 0 { (dvec3(1.0, 2.0, 3.0), 5.0) } else { (dvec3(-1.0, 2.0, 30.0), 1.0) };
+                let (position, intensity) =
+                    if s.emitter == 0 { (dvec3(1.0, 2.0, 3.0), 5.0) } else { (dvec3(-1.0, 2.0, 30.0), 1.0) };
                 assert!(s.pdf == 0.0 && s.point == position && !s.on_surface);
                 let expected = 5.0 * intensity / position.distance_squared(FROM);
                 assert!((f64::from(s.weight.x) / expected - 1.0).abs() < 1e-6);
@@ -346,7 +347,8 @@ fn filters_are_drawn_with_their_density() {
         let (low, high, density): (f64, f64, Box<dyn Fn(f64) -> f64>) = match filter {
             ReconstructionFilter::Box => (0.0, 1.0, Box::new(|_| 1.0)),
             ReconstructionFilter::Gaussian { stddev } => {
-                let f = move |x: f64| ((-(x - 0.5).powi(2) / (2.0 * stddev * stddev)).exp() - (-8.0_f64).exp()).max(0.0);
+                let f =
+                    move |x: f64| ((-(x - 0.5).powi(2) / (2.0 * stddev * stddev)).exp() - (-8.0_f64).exp()).max(0.0);
                 (0.5 - 4.0 * stddev, 0.5 + 4.0 * stddev, Box::new(f))
             }
         };
@@ -354,7 +356,8 @@ fn filters_are_drawn_with_their_density() {
         let cells: Vec<_> =
             (0..CELLS).map(|i| integrate(&density, low + width * i as f64, low + width * (i + 1) as f64)).collect();
         let total: f64 = cells.iter().sum();
-        let probabilities: Vec<_> = cells.iter().flat_map(|y| cells.iter().map(move |x| x * y / total / total)).collect();
+        let probabilities: Vec<_> =
+            cells.iter().flat_map(|y| cells.iter().map(move |x| x * y / total / total)).collect();
         let mut counts = vec![0; probabilities.len()];
         for i in 0..200_000 {
             let [x, y] = filter.sample(&mut Sampler::new(51, i, 0, 0)).map(|x| (x - low) / width);

@@ -148,8 +148,8 @@ impl Media {
     #[must_use]
     pub fn short_flight(&self, segment: &Segment, medium: MediumId, tau: f64) -> Option<Segment> {
         let t = tau / (self.medium(medium).sigma_t * segment.length());
-        // Not so for NaN: no extinction, no length.
-        if !(t < 1.0) {
+        // NaN: no extinction, no length.
+        if t.is_nan() || t >= 1.0 {
             return None;
         }
         let flight = Segment::new(segment.p, segment.at(t));

@@ -86,8 +86,7 @@ mod tests {
                 for k in 0..n {
                     let share = |depth: f64| -(-depth).exp_m1() / width - f64::from(k);
                     let (first, last) = (stratum_depth(k, width, 0.0), stratum_depth(k, width, 1.0).min(tau));
-                    let even: Vec<_> =
-                        (0..=CELLS).map(|i| first + (last - first) * i as f64 / CELLS as f64).collect();
+                    let even: Vec<_> = (0..=CELLS).map(|i| first + (last - first) * i as f64 / CELLS as f64).collect();
                     let of_share = (0..=CELLS).map(|i| -(-(f64::from(k) + i as f64 / CELLS as f64) * width).ln_1p());
                     let borders = if last - first < 4.0 { even } else { of_share.collect() };
                     let mut probabilities: Vec<_> = borders.windows(2).map(|b| share(b[1]) - share(b[0])).collect();
