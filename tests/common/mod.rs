@@ -133,8 +133,8 @@ pub fn integrate(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
         let (fl, fr) = (f(0.5 * (a + m)), f(0.5 * (m + b)));
         let (left, right) = (simpson(fa, fl, fm, m - a), simpson(fm, fr, fb, b - m));
         let delta = left + right - whole;
-        // Where the tolerance is below the rounding of the value itself, nothing is gained by halving.
-        if depth == 0 || delta.abs() <= 15.0 * tol.max(f64::EPSILON * whole.abs()) {
+        // Below the rounding of the values nothing is gained by halving; exp(−τ) of an optical depth of hundreds rounds to 10⁻¹³.
+        if depth == 0 || delta.abs() <= 15.0 * tol.max(1e-12 * whole.abs()) {
             return left + right + delta / 15.0;
         }
         refine(f, a, m, fa, fl, fm, left, 0.5 * tol, depth - 1)

@@ -215,5 +215,24 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
         return None;
     }
     let sum = weight_a + weight_b + weight_c;
-    Some(TriangleHit { t: side_p / (side_p - side_q), barycentric: [weight_a / sum, weight_b / sum, weight_c / sum] })
+    let t = if side_p == 0.0 {
+        0.0
+    } else if side_q == 0.0 {
+        1.0
+    } else {
+        plane_parameter(segment, triangle).unwrap_or(side_p / (side_p - side_q))
+    };
+    Some(TriangleHit { t, barycentric: [weight_a / sum, weight_b / sum, weight_c / sum] })
+}
+
+/// Where the segment crosses the triangle's plane. The predicates are certain of their sign, but their size may be nothing but rounding where an end
+/// is far away; here the segment's vector takes the place of the far end. `None` if the plane of so thin a triangle is not known to a
+/// thousandth, at this angle.
+fn plane_parameter(segment: &Segment, triangle: &Triangle) -> Option<f64> {
+    let [a, b, c] = triangle.vertices_f64();
+    let d = segment.q - segment.p;
+    let normal = (b - a).cross(c - a);
+    let slope = normal.dot(d);
+    let rounding = 8.0 * U * (b - a).length() * (c - a).length() * d.length();
+    (slope.abs() > 1024.0 * rounding).then(|| (normal.dot(a - segment.p) / slope).clamp(0.0, 1.0))
 }

@@ -17,7 +17,8 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let mut object = Object::new(loader, element, &["obj", "cube", "rectangle"])?;
     let to_world = object.world_transform()?;
     let flip = object.boolean("flip_normals", false)?;
-    let mut triangles = match object.kind() {
+    let mut placed = Placement::new(to_world);
+    match object.kind() {
         "obj" => {
             object.boolean("flip_tex_coords", true)?;
             if !object.boolean("face_normals", false)? {
@@ -29,19 +30,23 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
             let name = object
                 .string("filename")?
                 .ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
-            obj(loader, name, object.place_of("filename"), to_world)?
+            obj(loader, name, object.place_of("filename"), &mut placed)?;
         }
         "cube" => {
             object.boolean("face_normals", false)?;
-            cube(to_world)
+            cube(&mut placed);
         }
-        _ => rectangle(to_world),
-    };
-    if !triangles.iter().all(Triangle::is_finite) {
+        _ => rectangle(&mut placed),
+    }
+    if !placed.triangles.iter().all(Triangle::is_finite) {
         return Err(
             object.error("its vertices are too large for single precision after to_world", "scale the scene down")
         );
     }
+    if let Some(message) = placed.lost_shape() {
+        return Err(object.error(message, "move the whole scene closer to the origin, or make the shape larger"));
+    }
+    let mut triangles = placed.triangles;
     if to_world.determinant() < 0.0 {
         loader.warn(
             &element.at,
@@ -142,14 +147,51 @@ fn area_emitter<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Opti
     Ok(Some(radiance))
 }
 
-fn transformed(to_world: DMat4, corners: [DVec3; 3]) -> Triangle {
-    let [a, b, c] = corners.map(|p| to_world.transform_point3(p).as_vec3());
-    Triangle::new(a, b, c)
+/// A shape may be displaced by its rounding to single precision by this share of its longest side.
+const MOST_LOST: f64 = 1.0 / 256.0;
+
+/// The triangles of a shape at their place in the world, rounded to single precision, and what that did to them.
+struct Placement {
+    to_world: DMat4,
+    triangles: Vec<Triangle>,
+    /// Bounds before the rounding.
+    low: DVec3,
+    high: DVec3,
+    /// The largest change of a coordinate by rounding.
+    lost: f64,
+}
+
+impl Placement {
+    const fn new(to_world: DMat4) -> Self {
+        Self { to_world, triangles: Vec::new(), low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, lost: 0.0 }
+    }
+
+    fn push(&mut self, corners: [DVec3; 3]) {
+        let vertices = corners.map(|p| {
+            let p = self.to_world.transform_point3(p);
+            (self.low, self.high) = (self.low.min(p), self.high.max(p));
+            let rounded = p.as_vec3();
+            self.lost = self.lost.max((rounded.as_dvec3() - p).abs().max_element());
+            rounded
+        });
+        self.triangles.push(Triangle { vertices });
+    }
+
+    /// What is wrong if the shape is not the one that was meant any more: far from the origin the steps of single precision are coarse.
+    fn lost_shape(&self) -> Option<String> {
+        let longest = (self.high - self.low).max_element();
+        // A point has no shape to lose.
+        (longest > 0.0 && self.lost > longest * MOST_LOST).then(|| {
+            format!(
+                "precision exhausted: single precision moves its vertices by up to {:.1e}, and its longest side is {longest:.1e}",
+                self.lost
+            )
+        })
+    }
 }
 
 /// [−1, 1]³, normals outward.
-fn cube(to_world: DMat4) -> Vec<Triangle> {
-    let mut triangles = Vec::with_capacity(12);
+fn cube(placed: &mut Placement) {
     for axis in 0..3 {
         for sign in [-1.0, 1.0] {
             let corner = |u: f64, v: f64| {
@@ -161,21 +203,21 @@ fn cube(to_world: DMat4) -> Vec<Triangle> {
                 DVec3::from_array(p)
             };
             let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-            triangles.push(transformed(to_world, [a, b, c]));
-            triangles.push(transformed(to_world, [a, c, d]));
+            placed.push([a, b, c]);
+            placed.push([a, c, d]);
         }
     }
-    triangles
 }
 
 /// [−1, 1]² at z = 0, normal +Z.
-fn rectangle(to_world: DMat4) -> Vec<Triangle> {
+fn rectangle(placed: &mut Placement) {
     let [a, b, c, d] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
-    vec![transformed(to_world, [a, b, c]), transformed(to_world, [a, c, d])]
+    placed.push([a, b, c]);
+    placed.push([a, c, d]);
 }
 
 /// A Wavefront OBJ file, all its groups as one mesh.
-fn obj(loader: &Loader<'_>, name: &str, at: &Place, to_world: DMat4) -> Result<Vec<Triangle>, RenderError> {
+fn obj(loader: &Loader<'_>, name: &str, at: &Place, placed: &mut Placement) -> Result<(), RenderError> {
     let path = sibling(loader.source.path(), name);
     let bytes = loader.source.read(&path).map_err(|e| {
         at.error(
@@ -190,7 +232,6 @@ fn obj(loader: &Loader<'_>, name: &str, at: &Place, to_world: DMat4) -> Result<V
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut BufReader::new(text.as_bytes()), &options, no_materials)
         .map_err(|e| fail(e.to_string()))?;
-    let mut triangles = Vec::new();
     for model in &models {
         let vertex = |index: u32| {
             let start = usize::try_from(index).ok()?.checked_mul(3)?;
@@ -205,13 +246,13 @@ fn obj(loader: &Loader<'_>, name: &str, at: &Place, to_world: DMat4) -> Result<V
             if !(a.is_finite() && b.is_finite() && c.is_finite()) {
                 return Err(fail("a vertex is not finite".to_owned()));
             }
-            triangles.push(transformed(to_world, [a, b, c]));
+            placed.push([a, b, c]);
         }
     }
-    if triangles.is_empty() {
+    if placed.triangles.is_empty() {
         return Err(fail("the mesh has no faces".to_owned()));
     }
-    Ok(triangles)
+    Ok(())
 }
 
 /// `tobj` counts negative indices from the end, Mitsuba refuses them: a scene must load in both.

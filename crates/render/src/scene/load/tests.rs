@@ -452,3 +452,19 @@ proptest! {
         try_builtin(&builtin_text(), Some(&mutate(&mesh, &cuts)));
     }
 }
+
+/// A shape that single precision would make another one is refused; one whose vertices can be said exactly is not, nor one without extent.
+#[test]
+fn a_shape_too_far_from_the_origin_is_refused() {
+    let at = |x: &str, scale: f64| {
+        format!(
+            "<shape type='cube'><transform name='to_world'><scale value='{scale}'/><translate x='{x}' y='-{x}'/></transform></shape>"
+        )
+    };
+    refused(&at("10000000.3", 5.0), "3:1", "precision exhausted");
+    refused(&at("1e9", 5.0), "3:1", "closer to the origin");
+    refused(&at("0", 1e-44), "3:1", "precision exhausted");
+    for fine in [at("1e7", 5.0), at("10000000.3", 500.0), at("70.1", 0.01), at("0", 1e-40), at("0.1", 0.0)] {
+        load(&fine);
+    }
+}
