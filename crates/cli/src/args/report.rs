@@ -103,8 +103,9 @@ Examples:
 Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2 usage error, 130 interrupted."
 )]
 pub(crate) struct ReportThesisArgs {
-    /// Scenes, separated by commas
-    #[arg(long, value_name = "SCENE", value_delimiter = ',', default_value = "cbox_vol6,cbox_vol4,san-miguel,scape")]
+    /// Scenes, separated by commas; cbox_vol2 and cbox_vol3 are in Tables 6.1 and 6.2 only
+    #[arg(long, value_name = "SCENE", value_delimiter = ',', default_value = "cbox_vol2,cbox_vol3,cbox_vol4,cbox_vol6,san-miguel,scape",
+        value_parser = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "san-miguel", "scape"])]
     pub(crate) scenes: Vec<String>,
     /// Methods, separated by commas
     #[arg(long, default_value = "all", value_name = "all|METHOD", value_delimiter = ',')]

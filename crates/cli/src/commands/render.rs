@@ -73,10 +73,7 @@ pub(super) fn write_stream(path: &Path, stream: &QueryStream) -> Result<(), Fail
 }
 
 /// The integrator that two options name together.
-pub(super) fn integrator(
-    name: IntegratorName,
-    samples_per_segment: Option<u32>,
-) -> Result<IntegratorKind, Failure> {
+pub(super) fn integrator(name: IntegratorName, samples_per_segment: Option<u32>) -> Result<IntegratorKind, Failure> {
     Ok(match (name, samples_per_segment) {
         (IntegratorName::Volpath, None) => IntegratorKind::Volpath,
         (IntegratorName::Volpath, Some(_)) => {

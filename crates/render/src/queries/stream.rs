@@ -1,26 +1,5 @@
-//! The file of a stream, version 1. All numbers are little-endian.
-//!
-//! | offset | type | what |
-//! | --- | --- | --- |
-//! | 0 | 8 bytes | `VDFQUERY` |
-//! | 8 | u32 | version, 1 |
-//! | 12 | u32 | size of this header, 80 |
-//! | 16 | u64 | number of queries |
-//! | 24 | u64 | paths of the whole render |
-//! | 32 | u64 | paths whose queries are here, all of them; chosen at random |
-//! | 40 | u64 | seed of the render |
-//! | 48 | u32 | samples per pixel |
-//! | 52 | u32 | samples per path segment of `raymarch`; 0 is `volpath` |
-//! | 56 | u64 | number of occluding triangles |
-//! | 64 | u32 | CRC-32 of the triangles, as in the file of [`write_triangles`] |
-//! | 68 | u32 | number of emitters of the scene |
-//! | 72 | u32 | CRC-32 of all queries below |
-//! | 76 | u32 | 0 |
-//! | 80 | | the queries, 56 bytes each |
-//!
-//! A query is six f64, the segment's start (where light would arrive) and end (the point on the emitter), a u32 number of
-//! the emitter, and a u32 of flags: 1 is spatial (neither end lies on an occluder), 2 is unoccluded (the exact answer). In Python:
-//! `numpy.fromfile(name, [("from", "<f8", 3), ("to", "<f8", 3), ("emitter", "<u4"), ("flags", "<u4")], offset=80)`.
+//! Streams in memory and in files. The format, version 1, is described byte by byte in `docs/query-streams.md`: a header of 80 bytes,
+//! and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles that they are about.
 
 use std::{
     fs::File,

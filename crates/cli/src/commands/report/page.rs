@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Context as _;
-use minijinja::{Environment, context};
+use minijinja::{Environment, context, syntax::SyntaxConfig, value::Serde};
 use serde::Serialize;
 
 use super::{plot::Plot, provenance::Provenance};
@@ -112,12 +112,14 @@ impl Page {
     /// The page in one file: no script, nothing loaded from elsewhere.
     pub(super) fn html(&self, provenance: &Provenance) -> anyhow::Result<String> {
         let mut environment = Environment::new();
-        environment.set_trim_blocks(true);
-        environment.set_lstrip_blocks(true);
+        let syntax = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build();
+        environment.set_syntax(syntax.context("cannot make the page")?);
         environment
             .add_template("report.html", include_str!("../../../templates/report.html"))
             .and_then(|()| environment.get_template("report.html"))
-            .and_then(|template| template.render(context! { page => self, provenance => provenance.entries() }))
+            .and_then(|template| {
+                template.render(context! { page => Serde(self), provenance => Serde(provenance.entries()) })
+            })
             .context("cannot make the page")
     }
 
@@ -147,13 +149,15 @@ impl Table {
     fn text(&self) -> String {
         let mut lines: Vec<Vec<String>> = vec![self.columns.iter().map(|c| (*c).to_owned()).collect()];
         lines.extend(self.rows.iter().map(|row| row.cells.iter().map(Cell::plain).collect()));
-        let width = |column: usize| lines.iter().filter_map(|l| l.get(column)).map(|c| c.chars().count()).max().unwrap_or(0);
+        let width =
+            |column: usize| lines.iter().filter_map(|l| l.get(column)).map(|c| c.chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let mut text = if self.caption.is_empty() { String::new() } else { format!("{}\n", self.caption) };
         for line in &lines {
-            let padded = line.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| {
-                if i == 0 { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
-            });
+            let padded =
+                line.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| {
+                    if i == 0 { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+                });
             text.push_str(padded.collect::<Vec<_>>().join("  ").trim_end());
             text.push('\n');
         }

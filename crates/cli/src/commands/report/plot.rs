@@ -93,9 +93,8 @@ struct Axis {
 
 impl Axis {
     fn covering(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let (low, high) = values
-            .map(f64::log10)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let (low, high) =
+            values.map(f64::log10).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         let margin = (0.05 * (high - low)).max(0.05);
         Self { low: low - margin, high: high + margin, from, to }
     }

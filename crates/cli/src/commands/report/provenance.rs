@@ -3,7 +3,7 @@
 use std::{env, thread};
 
 use serde::Serialize;
-use sysinfo::System;
+use sysinfo::{CpuRefreshKind, RefreshKind, System};
 
 /// What one has to know to repeat a measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -30,10 +30,10 @@ pub(super) struct Provenance {
 
 impl Provenance {
     pub(super) fn new(seed: u64) -> Self {
-        let system = System::new_with_specifics(
-            sysinfo::RefreshKind::nothing().with_cpu(sysinfo::CpuRefreshKind::nothing()),
-        );
-        let cpu = system.cpus().first().map(|c| c.brand().trim().to_owned()).filter(|brand| !brand.is_empty());
+        let refresh = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
+        let system = System::new_with_specifics(refresh).ok();
+        let brand = system.as_ref().and_then(|s| s.cpus().first()).map(|c| c.brand().trim().to_owned());
+        let cpu = brand.filter(|brand| !brand.is_empty());
         Self {
             command: env::args_os().map(|a| quoted(&a.to_string_lossy())).collect::<Vec<_>>().join(" "),
             seed,
@@ -43,7 +43,7 @@ impl Provenance {
             rustc: option_env!("VDF_RUSTC").unwrap_or("unknown"),
             cpu: cpu.unwrap_or_else(|| env::consts::ARCH.to_owned()),
             cores: thread::available_parallelism().map_or(1, usize::from),
-            os: System::long_os_version().unwrap_or_else(|| env::consts::OS.to_owned()),
+            os: System::long_os_version().unwrap_or_else(|_| env::consts::OS.to_owned()),
         }
     }
 

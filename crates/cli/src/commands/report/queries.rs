@@ -4,8 +4,10 @@ use std::{fs, path::Path};
 
 use anyhow::{Context as _, anyhow};
 use vdf_render::{
-    IntegratorKind, RenderOptions, World,
-    queries::{MethodReplay, QueryStream, Replay, ReplayOptions, StreamOrigin, Timing, record_queries, replay, write_triangles},
+    RenderOptions, World,
+    queries::{
+        MethodReplay, QueryStream, Replay, ReplayOptions, StreamOrigin, Timing, record_queries, replay, write_triangles,
+    },
     scene::Scene,
 };
 
@@ -85,14 +87,6 @@ pub(super) fn integrator_name(samples_per_segment: Option<u32>) -> String {
     samples_per_segment.map_or_else(|| "volpath".to_owned(), |n| format!("raymarch {n}"))
 }
 
-/// The number of an integrator's samples per segment, as a stream has it.
-pub(super) const fn samples(integrator: IntegratorKind) -> Option<u32> {
-    match integrator {
-        IntegratorKind::Volpath => None,
-        IntegratorKind::Raymarch { samples_per_segment } => Some(samples_per_segment),
-    }
-}
-
 fn page(name: &str, scene: &Scene, origin: &StreamOrigin, r: &Replay) -> Page {
     let lead = vec![format!(
         "{} visibility queries of {} with {} samples per pixel in {name} ({} triangles, {} emitters), from {} of {} paths. \
@@ -146,8 +140,20 @@ fn hierarchy_section(r: &Replay) -> Section {
 
 fn methods_section(r: &Replay) -> Section {
     let columns = vec![
-        "method", "V_size", "voxels", "memory", "T_build", "p_acc|sp", "u", "t_query ns", "t_acc ns", "t_acc/t_query",
-        "t_eff ns", "speed-up", "of all", "pays from",
+        "method",
+        "V_size",
+        "voxels",
+        "memory",
+        "T_build",
+        "p_acc|sp",
+        "u",
+        "t_query ns",
+        "t_acc ns",
+        "t_acc/t_query",
+        "t_eff ns",
+        "speed-up",
+        "of all",
+        "pays from",
     ];
     let mut size = None;
     let rows = r
@@ -205,7 +211,11 @@ fn plots(r: &Replay) -> Vec<Plot> {
         }
         let xs: Vec<f64> = series.iter().flat_map(|s| s.points.iter().map(|p| p.0)).collect();
         let t = r.hierarchy.t_spatial.median;
-        series.push(Series { name: "hierarchy alone".to_owned(), points: xs.iter().map(|&x| (x, t)).collect(), ..style("none") });
+        series.push(Series {
+            name: "hierarchy alone".to_owned(),
+            points: xs.iter().map(|&x| (x, t)).collect(),
+            ..style("none")
+        });
         Plot::logarithmic(title.to_owned(), "voxels", y_label, series)
     };
     let effective = plot("A spatial query with its fallback", "t_eff, ns", |m| m.t_effective.median);
