@@ -13,7 +13,9 @@
 //! *Cost.* Recording follows only the paths that are kept, and is a pass of its own: a render never knows of it.
 //!
 //! *Limits.* A replay has nothing to do between queries, so caches hold more of the structures, and a core overlaps more queries, than in a
-//! render. Both favour the hierarchy and the methods alike.
+//! render. Both favour the hierarchy and the methods alike. Chosen paths lie apart from each other and share less of the caches than all paths do: in
+//! `cbox_vol2` with `volpath`, fields of 7.5 million voxels took up to a third longer than in a stream of all paths, speed-ups were within 0.1. One sample per pixel and a bound
+//! that takes all of it has the coherence of a render.
 
 mod record;
 mod replay;

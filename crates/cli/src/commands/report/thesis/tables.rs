@@ -102,6 +102,7 @@ impl Tables<'_> {
                 Cell::from(scene.name),
                 "hierarchy".into(),
                 "".into(),
+                "".into(),
                 Cell::beside(nanoseconds(t_query), hierarchy.map(nanoseconds)),
                 "".into(),
             ];
@@ -110,15 +111,18 @@ impl Tables<'_> {
                 let (t_acc, r) = (m.replay.t_acc.median, &m.replay);
                 let thesis = self.thesis.proof_time(scene.name, r.method, r.voxel_size);
                 let about = about("6.4", scene.name, Some(49), r.method, Some(r.voxel_size));
-                figures.push(about.figure("t_acc", "ns", t_acc, thesis.map(|t| t.t_acc)));
-                figures.push(about.figure("t_acc/t_query", "", t_acc / t_query, thesis.map(|t| t.ratio / 100.0)));
+                let derived = r.t_acc_derived;
+                figures.push(about.figure("t_acc", "ns", t_acc, None));
+                figures.push(about.figure("t_acc by 6.3.2", "ns", derived, thesis.map(|t| t.t_acc)));
+                figures.push(about.figure("t_acc/t_query", "", derived / t_query, thesis.map(|t| t.ratio / 100.0)));
                 rows.push(Row::new(vec![
                     scene.name.into(),
                     r.method.into(),
                     r.voxel_size.to_string().into(),
-                    Cell::beside(nanoseconds(t_acc), thesis.map(|t| nanoseconds(t.t_acc))),
+                    nanoseconds(t_acc).into(),
+                    Cell::beside(nanoseconds(derived), thesis.map(|t| nanoseconds(t.t_acc))),
                     Cell::beside(
-                        format!("{:.0} %", 100.0 * t_acc / t_query),
+                        format!("{:.0} %", 100.0 * derived / t_query),
                         thesis.map(|t| format!("{:.0} %", t.ratio)),
                     ),
                 ]));
@@ -129,13 +133,14 @@ impl Tables<'_> {
             heading: "Table 6.4 and Figure 6.7: the time of a proof".to_owned(),
             paragraphs: vec![
                 "t_query is the mean over all queries of the ray marcher with 49 samples per segment, by the hierarchy alone. t_acc is the attempt of a proof for \
-                 a spatial query, measured directly; the thesis computes it from the difference of two renders."
+                 a spatial query, measured directly. By 6.3.2 is what the thesis computes from the difference of two renders, here from that of two replays: \
+                 t_eff - (1 - p_acc|sp) t_query, with the time that a fallback waits for its proof."
                     .to_owned(),
             ],
             plots,
             tables: vec![Table {
                 caption: String::new(),
-                columns: vec!["scene", "method", "V_size", "t_acc", "t_acc/t_query"],
+                columns: vec!["scene", "method", "V_size", "t_acc", "by 6.3.2", "of t_query"],
                 rows,
             }],
             ..Section::default()
