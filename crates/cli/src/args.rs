@@ -1,9 +1,13 @@
 //! The command line as typed.
 
+mod report;
+
 use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use vdf_render::{Method, UnknownMethod, metrics::PIXELS_PER_DEGREE, scene::PixelRect};
+
+pub(crate) use report::{ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportThesisArgs};
 
 /// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.
 #[derive(Debug, Parser)]
@@ -20,6 +24,7 @@ pub(crate) enum Command {
     Verify(VerifyArgs),
     Voxelize(VoxelizeArgs),
     Compare(CompareArgs),
+    Report(ReportArgs),
 }
 
 /// Render a scene to an EXR and a PNG.
@@ -29,6 +34,7 @@ pub(crate) enum Command {
   vdf render --method amr-sn --voxel 8 -o fog.exr  with a method and a voxel size
   vdf render scene.xml -D spp=64 --stats fog.json  a Mitsuba 3 scene with a parameter
   vdf render cbox_vol4 --integrator raymarch --samples-per-segment 49 --spp 4
+  vdf render --record-queries fog.vdfq             also records visibility queries, to replay them
 
 Exit codes: 0 done, 1 failure while rendering or writing, 2 usage or scene error, 130 interrupted.")]
 pub(crate) struct RenderArgs {
@@ -74,6 +80,13 @@ pub(crate) struct RenderArgs {
     /// Write the statistics as JSON
     #[arg(long, value_name = "FILE.json")]
     pub(crate) stats: Option<PathBuf>,
+    /// Write visibility queries of this render, to replay them with vdf report queries; followed in a pass of their
+    /// own after the render, which they neither change nor slow
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record_queries: Option<PathBuf>,
+    /// The most queries to record: those of whole paths, chosen at random but the same in every run
+    #[arg(long, default_value = "1e6", value_name = "N", value_parser = parse_count, requires = "record_queries")]
+    pub(crate) max_queries: u64,
     /// No progress and no statistics in words; errors and warnings only
     #[arg(short, long)]
     pub(crate) quiet: bool,

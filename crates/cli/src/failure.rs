@@ -61,7 +61,11 @@ impl From<RenderError> for Failure {
     fn from(e: RenderError) -> Self {
         match e {
             RenderError::Cancelled => Self::Interrupted,
-            RenderError::Threads { .. } | RenderError::Image(_) | RenderError::Field(_) => Self::Work(e.into()),
+            RenderError::Threads { .. }
+            | RenderError::Image(_)
+            | RenderError::Field(_)
+            | RenderError::WrongAnswer(_)
+            | RenderError::UnstableAnswers { .. } => Self::Work(e.into()),
             _ => Self::Usage(e.into()),
         }
     }

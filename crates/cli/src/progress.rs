@@ -24,6 +24,21 @@ pub(crate) struct Reporter {
     interrupted: Arc<AtomicBool>,
 }
 
+/// A part of a larger work, which counts its parts itself: it can be stopped, and that is all.
+pub(crate) struct Part<'a>(pub(crate) &'a Reporter);
+
+impl Progress for Part<'_> {
+    fn phase(&self, _: &str) {}
+
+    fn work_total(&self, _: u64) {}
+
+    fn work_done(&self, _: u64) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.interrupted()
+    }
+}
+
 /// What the lines are about.
 struct Lines {
     phase: String,
@@ -48,7 +63,7 @@ impl Reporter {
         let terminal = stderr().is_terminal();
         let bar = (!quiet && terminal).then(|| {
             let style =
-                ProgressStyle::with_template("{msg:16} {bar:40} {percent:>3} %  {elapsed_precise}  left {eta_precise}");
+                ProgressStyle::with_template("{msg:24} {bar:32} {percent:>3} %  {elapsed_precise}  left {eta_precise}");
             let bar = ProgressBar::new(0);
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
@@ -83,7 +98,9 @@ impl Progress for Reporter {
 
     fn work_total(&self, n: u64) {
         self.total.store(n, Ordering::Relaxed);
+        self.done.store(0, Ordering::Relaxed);
         if let Some(bar) = &self.bar {
+            bar.set_position(0);
             bar.set_length(n);
         }
     }

@@ -71,6 +71,35 @@ pub enum RenderError {
     /// A distance field or a neighbourhood is not what its occluders make it.
     #[error(transparent)]
     Field(#[from] vdf_distfield::FieldError),
+    /// A file of visibility queries cannot be read, or is none, or was recorded in another scene.
+    #[error("{}: {message}", path.display())]
+    Queries {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and how to mend it.
+        message: String,
+    },
+    /// There is nothing to replay.
+    #[error("no {kind} queries to measure: {help}")]
+    NoQueries {
+        /// Which queries are missing.
+        kind: &'static str,
+        /// How to mend it.
+        help: &'static str,
+    },
+    /// A replayed query was answered otherwise than it must be. This is a bug of the program, never of a scene.
+    #[error("WRONG ANSWER: {0}")]
+    WrongAnswer(Box<crate::queries::WrongAnswer>),
+    /// A pass that was timed answers otherwise than when it was checked. This is a bug of the program or of the machine.
+    #[error("WRONG ANSWER: {method} says yes {found} times in a timed pass but {expected} times when checked")]
+    UnstableAnswers {
+        /// The method.
+        method: &'static str,
+        /// Proofs, or unoccluded queries, in the timed pass.
+        found: usize,
+        /// The same when checked.
+        expected: usize,
+    },
     /// The threads could not be started.
     #[error("cannot start the rendering threads: {message}")]
     Threads {

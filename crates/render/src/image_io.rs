@@ -118,22 +118,35 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue
 /// # Errors
 /// The file cannot be written, or the image has no pixels.
 pub fn write_png(path: &Path, image: &Image) -> Result<(), ImageError> {
-    check_shape(image).map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
+    let bytes = encode_png(image).map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
+    write_bytes(path, &bytes)
+}
+
+/// The bytes that [`write_png`] writes.
+///
+/// # Errors
+/// Says what is wrong if the image has no pixels.
+pub fn encode_png(image: &Image) -> Result<Vec<u8>, String> {
+    check_shape(image)?;
     let samples: Vec<u8> = image.pixels.iter().flat_map(|pixel| pixel.to_array().map(srgb_byte)).collect();
-    write_png_bytes(path, image.width, image.height, &samples)
+    encode_png_bytes(image.width, image.height, &samples)
 }
 
 /// Writes an 8-bit PNG of red, green and blue, as a display takes them.
 pub(crate) fn write_png_bytes(path: &Path, width: u32, height: u32, samples: &[u8]) -> Result<(), ImageError> {
     let unencodable = |reason: String| ImageError::Unencodable { path: path.to_owned(), reason };
+    write_bytes(path, &encode_png_bytes(width, height, samples).map_err(unencodable)?)
+}
+
+fn encode_png_bytes(width: u32, height: u32, samples: &[u8]) -> Result<Vec<u8>, String> {
     if samples.is_empty() || samples.len() != 3 * width as usize * height as usize {
-        return Err(unencodable(format!("the image is {width} × {height} pixels but holds {} bytes", samples.len())));
+        return Err(format!("the image is {width} × {height} pixels but holds {} bytes", samples.len()));
     }
     let mut bytes = Vec::new();
     let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
     image::ImageEncoder::write_image(encoder, samples, width, height, image::ExtendedColorType::Rgb8)
-        .map_err(|error| unencodable(error.to_string()))?;
-    write_bytes(path, &bytes)
+        .map_err(|error| error.to_string())?;
+    Ok(bytes)
 }
 
 /// The kinds of files that images are read from.

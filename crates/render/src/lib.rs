@@ -21,6 +21,7 @@ mod method;
 pub mod metrics;
 mod options;
 mod phase;
+pub mod queries;
 mod render;
 mod sampler;
 pub mod scene;
@@ -37,17 +38,18 @@ pub use area_light::AreaNeighbourhood;
 pub use atomic_file::{check_writable, write_atomically};
 pub use error::RenderError;
 pub use image::Image;
-pub use image_io::{AttributeValue, ImageError, ImageFormat, read_exr, read_image, write_exr, write_png};
+pub use image_io::{AttributeValue, ImageError, ImageFormat, encode_png, read_exr, read_image, write_exr, write_png};
 pub use lights::{LightSample, Lights};
 pub use media::{Flight, Media};
 pub use mesh::Triangle;
 pub use method::{FieldKind, Method, NeighbourhoodKind, UnknownMethod};
-pub use options::{IntegratorKind, Progress, RenderOptions, TransmittanceEstimator};
-pub use render::{Rendering, render};
+pub use options::{IntegratorKind, Progress, RenderOptions, TransmittanceEstimator, default_voxel_size};
+pub use render::{Prepared, Rendering, render, render_prepared};
 pub use sampler::Sampler;
 pub use statistics::{NeighbourhoodSize, Statistics};
 pub use visibility::{
-    Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, Proofs, QueryKind, ShadowQuery, Visibility,
+    Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, NoRecorder, Proofs, QueryKind, Recorder, ShadowQuery,
+    Visibility,
 };
 pub use voxels::SceneVoxels;
 pub use world::{SurfacePoint, World};

@@ -145,8 +145,9 @@ pub(crate) fn on_threads<T: Send>(
     pool.map_err(|e| RenderError::Threads { message: e.to_string() })?.install(work)
 }
 
-/// A 128th of the longest side of these bounds.
-pub(crate) fn default_voxel_size((min, max): (DVec3, DVec3)) -> f64 {
+/// A 128th of the longest side of these bounds, the side of a voxel where none is given; 1 if they are one point.
+#[must_use]
+pub fn default_voxel_size((min, max): (DVec3, DVec3)) -> f64 {
     let extent = (max - min).max_element();
     // A scene of one point has no extent; any size covers it with one voxel.
     if extent > 0.0 { extent / 128.0 } else { 1.0 }

@@ -8,13 +8,13 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::{
-    Acceleration, Image, IntegratorKind, Progress, ProofsVisitor, RenderError, RenderOptions, Rgb, Sampler, Statistics,
-    TransmittanceEstimator, World,
+    Acceleration, BuildReport, Image, IntegratorKind, Progress, ProofsVisitor, RenderError, RenderOptions, Rgb,
+    Sampler, Statistics, TransmittanceEstimator, World,
     integrator::{Integrator, PathRay},
     options::{default_voxel_size, on_threads},
     scene::{PixelRect, Scene},
     statistics::Record,
-    visibility::{Counters, Proofs, Visibility},
+    visibility::{Counters, Proofs, Recorder, Visibility},
 };
 
 /// Side of a tile in pixels. Only progress sees tiles.
@@ -58,25 +58,55 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
         options.max_voxels,
     )?;
 
+    let prepared = Prepared { world: &world, t_hierarchy, acceleration: &acceleration, build: &build };
+    render_tiles(scene, &prepared, options, progress)
+}
+
+/// What a render needs and several renders can share.
+#[derive(Clone, Copy, Debug)]
+pub struct Prepared<'a> {
+    /// The scene, prepared by [`World::new`].
+    pub world: &'a World,
+    /// How many seconds that took.
+    pub t_hierarchy: f64,
+    /// The proofs of the method, from [`Acceleration::build`].
+    pub acceleration: &'a Acceleration,
+    /// What that built.
+    pub build: &'a BuildReport,
+}
+
+/// As [`render()`], without the preparation: `prepared` must be that of `scene`, its proofs those of `options.method`, which with
+/// `options.voxel_size` and `options.max_voxels` only says what the statistics are about.
+///
+/// # Errors
+/// If an option is not usable, or `progress` asks to stop.
+pub fn render_prepared(
+    scene: &Scene,
+    prepared: &Prepared<'_>,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Rendering, RenderError> {
+    options.validate(scene)?;
+    on_threads(options.threads, || render_tiles(scene, prepared, options, progress))
+}
+
+fn render_tiles(
+    scene: &Scene,
+    prepared: &Prepared<'_>,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Rendering, RenderError> {
+    let Prepared { world, t_hierarchy, acceleration, build } = *prepared;
     progress.phase("rendering");
     let start = Instant::now();
-    let job = Job {
-        scene,
-        world: &world,
-        kind: options.integrator,
-        transmittance: options.transmittance,
-        crop: options.crop.unwrap_or(scene.film.crop),
-        spp: options.spp.unwrap_or(scene.sample_count),
-        seed: options.seed.unwrap_or(scene.seed),
-        segment_first: options.segment_first,
-    };
+    let job = Job::new(scene, world, options);
     let (pixels, counters) = acceleration.accept(Run { job: &job, progress })?;
     let mut image = Image::cropped([scene.film.width, scene.film.height], job.crop);
     image.pixels = pixels;
     let statistics = Statistics::new(&Record {
         scene,
         options,
-        build: &build,
+        build,
         counters: &counters,
         t_hierarchy,
         t_render: start.elapsed().as_secs_f64(),
@@ -89,14 +119,14 @@ fn render_in_pool(scene: &Scene, options: &RenderOptions, progress: &dyn Progres
 }
 
 /// What to render, with all options resolved.
-struct Job<'a> {
-    scene: &'a Scene,
-    world: &'a World,
-    kind: IntegratorKind,
-    transmittance: TransmittanceEstimator,
-    crop: PixelRect,
-    spp: u32,
-    seed: u64,
+pub(crate) struct Job<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) world: &'a World,
+    pub(crate) kind: IntegratorKind,
+    pub(crate) transmittance: TransmittanceEstimator,
+    pub(crate) crop: PixelRect,
+    pub(crate) spp: u32,
+    pub(crate) seed: u64,
     segment_first: bool,
 }
 
@@ -114,20 +144,38 @@ impl ProofsVisitor for Run<'_> {
     }
 }
 
-impl Job<'_> {
-    fn size(&self) -> (u32, u32) {
+impl<'a> Job<'a> {
+    pub(crate) fn new(scene: &'a Scene, world: &'a World, options: &RenderOptions) -> Self {
+        Self {
+            scene,
+            world,
+            kind: options.integrator,
+            transmittance: options.transmittance,
+            crop: options.crop.unwrap_or(scene.film.crop),
+            spp: options.spp.unwrap_or(scene.sample_count),
+            seed: options.seed.unwrap_or(scene.seed),
+            segment_first: options.segment_first,
+        }
+    }
+
+    pub(crate) fn size(&self) -> (u32, u32) {
         (self.crop.x1 - self.crop.x0, self.crop.y1 - self.crop.y0)
+    }
+
+    /// The tiles, row by row.
+    pub(crate) fn tiles(&self) -> Vec<PixelRect> {
+        (self.crop.y0..self.crop.y1)
+            .step_by(TILE as usize)
+            .flat_map(|y0| (self.crop.x0..self.crop.x1).step_by(TILE as usize).map(move |x0| (x0, y0)))
+            .map(|(x0, y0)| PixelRect { x0, y0, x1: (x0 + TILE).min(self.crop.x1), y1: (y0 + TILE).min(self.crop.y1) })
+            .collect()
     }
 
     /// Renders all tiles; generic in the method, so that the dispatch stays out of the loops.
     fn run<P: Proofs>(&self, proofs: &P, progress: &dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
         let (width, height) = self.size();
         progress.work_total(u64::from(width) * u64::from(height));
-        let tiles: Vec<PixelRect> = (self.crop.y0..self.crop.y1)
-            .step_by(TILE as usize)
-            .flat_map(|y0| (self.crop.x0..self.crop.x1).step_by(TILE as usize).map(move |x0| (x0, y0)))
-            .map(|(x0, y0)| PixelRect { x0, y0, x1: (x0 + TILE).min(self.crop.x1), y1: (y0 + TILE).min(self.crop.y1) })
-            .collect();
+        let tiles = self.tiles();
         let rendered: Vec<_> = tiles
             .par_iter()
             .map(|tile| {
@@ -185,10 +233,11 @@ impl Job<'_> {
         Ok((pixels, counters))
     }
 
+    /// The radiance of one path.
     #[inline]
-    fn sample<P: Proofs>(
+    pub(crate) fn sample<P: Proofs, R: Recorder>(
         &self,
-        integrator: &Integrator<'_, P>,
+        integrator: &Integrator<'_, P, R>,
         x: u32,
         y: u32,
         sample: u32,

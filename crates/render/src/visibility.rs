@@ -123,7 +123,7 @@ impl<F: SafeZones, N: Neighbourhood> Proofs for NeighbourhoodProofs<F, N> {
 }
 
 /// A question for [`Visibility::unoccluded`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowQuery {
     /// Where light would arrive.
     pub from: DVec3,
@@ -186,19 +186,43 @@ impl std::ops::AddAssign for Counters {
     }
 }
 
+/// Hears every query that is asked, with its answer.
+pub trait Recorder {
+    /// `query` was asked, and this was the answer.
+    fn record(&self, query: &ShadowQuery, unoccluded: bool);
+}
+
+/// Nobody listens; compiles to nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct NoRecorder;
+
+impl Recorder for NoRecorder {
+    #[inline(always)]
+    fn record(&self, _: &ShadowQuery, _: bool) {}
+}
+
 /// Answers all visibility questions of an integrator.
 #[derive(Debug)]
-pub struct Visibility<'a, P> {
+pub struct Visibility<'a, P, R = NoRecorder> {
     bvh: &'a Bvh,
     proofs: &'a P,
     segment_first: bool,
+    recorder: R,
 }
 
 impl<'a, P: Proofs> Visibility<'a, P> {
     /// Asks `proofs` first and `bvh` for the rest; both about the same occluders. `segment_first` asks for proofs of free flights, too.
     #[must_use]
     pub const fn new(bvh: &'a Bvh, proofs: &'a P, segment_first: bool) -> Self {
-        Self { bvh, proofs, segment_first }
+        Self { bvh, proofs, segment_first, recorder: NoRecorder }
+    }
+}
+
+impl<'a, P: Proofs, R: Recorder> Visibility<'a, P, R> {
+    /// As [`Visibility::new`], but `recorder` hears of every query.
+    #[must_use]
+    pub const fn recorded(bvh: &'a Bvh, proofs: &'a P, segment_first: bool, recorder: R) -> Self {
+        Self { bvh, proofs, segment_first, recorder }
     }
 
     /// The first occluder along the segment.
@@ -227,6 +251,13 @@ impl<'a, P: Proofs> Visibility<'a, P> {
     /// Whether the closed segment of the query meets no occluder.
     #[inline]
     pub fn unoccluded(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
+        let unoccluded = self.ask(query, counters);
+        self.recorder.record(query, unoccluded);
+        unoccluded
+    }
+
+    #[inline]
+    fn ask(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
         counters.queries += 1;
         let answer = match query.kind {
             QueryKind::Spatial => {

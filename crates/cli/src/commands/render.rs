@@ -8,8 +8,10 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
 use vdf_render::{
-    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, TransmittanceEstimator,
-    check_writable, render,
+    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, TransmittanceEstimator, World,
+    check_writable,
+    queries::{QueryStream, record_queries},
+    render,
     scene::{DEFAULT_SCENE, LoadOptions, Scene, builtin, builtin_names},
     write_atomically, write_exr, write_png,
 };
@@ -31,18 +33,31 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
     let reporter = Reporter::new(args.quiet)?;
     let rendering = render(&scene, &options, &reporter);
+    let stream = match (&rendering, &args.record_queries) {
+        (Ok(_), Some(_)) => {
+            Some(record_queries(&scene, &World::new(&scene), &options, args.max_queries, &reporter)).transpose()
+        }
+        _ => Ok(None),
+    };
     reporter.finish();
-    let rendering = rendering?;
+    let (rendering, stream) = (rendering?, stream?);
     // A Ctrl-C after the last tile: the promise is that nothing is written.
     if reporter.interrupted() {
         return Err(Failure::Interrupted);
     }
 
+    if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
+        write_stream(path, stream)?;
+    }
     write_all(&rendering, &output, args, &name)?;
     let stdout = &mut std::io::stdout();
     if !args.quiet {
         writeln!(stdout, "{}", rendering.statistics)?;
         writeln!(stdout, "wrote          {} and {}", output.exr.display(), output.png.display())?;
+        if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
+            let (n, paths) = (stream.queries.len(), stream.origin.paths_recorded);
+            writeln!(stdout, "recorded       {n} queries of {paths} paths in {}", path.display())?;
+        }
     }
     Ok(())
 }
@@ -53,18 +68,30 @@ struct Output {
     png: PathBuf,
 }
 
-fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
-    let integrator = match (args.integrator, args.samples_per_segment) {
+/// Writes recorded queries.
+pub(super) fn write_stream(path: &Path, stream: &QueryStream) -> Result<(), Failure> {
+    stream.write(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)
+}
+
+/// The integrator that two options name together.
+pub(super) fn integrator(name: IntegratorName, samples_per_segment: Option<u32>) -> Result<IntegratorKind, Failure> {
+    Ok(match (name, samples_per_segment) {
         (IntegratorName::Volpath, None) => IntegratorKind::Volpath,
         (IntegratorName::Volpath, Some(_)) => {
             return Err(Failure::Usage(anyhow!("--samples-per-segment goes with --integrator raymarch only")));
         }
         (IntegratorName::Raymarch, n) => IntegratorKind::Raymarch { samples_per_segment: n.unwrap_or(7) },
-    };
+    })
+}
+
+fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
+    if args.max_queries == 0 {
+        return Err(Failure::Usage(anyhow!("--max-queries must be at least 1")));
+    }
     Ok(RenderOptions {
         method: args.method,
         voxel_size: args.voxel,
-        integrator,
+        integrator: integrator(args.integrator, args.samples_per_segment)?,
         transmittance: match args.transmittance {
             TransmittanceName::Analytic => TransmittanceEstimator::Analytic,
             TransmittanceName::Analog => TransmittanceEstimator::Analog,
@@ -107,10 +134,17 @@ fn output(args: &RenderArgs, name: &str) -> Result<Output, Failure> {
         )));
     }
     let png = exr.with_extension("png");
-    if let Some(stats) = args.stats.as_ref().filter(|s| is_same(s, &exr) || is_same(s, &png)) {
-        return Err(Failure::Usage(anyhow!("--stats {}: the image is written there", stats.display())));
+    for (option, path) in [("stats", &args.stats), ("record-queries", &args.record_queries)] {
+        if let Some(path) = path.as_ref().filter(|s| is_same(s, &exr) || is_same(s, &png)) {
+            return Err(Failure::Usage(anyhow!("--{option} {}: the image is written there", path.display())));
+        }
     }
-    for path in [Some(&exr), Some(&png), args.stats.as_ref()].into_iter().flatten() {
+    if let (Some(a), Some(b)) = (&args.stats, &args.record_queries)
+        && is_same(a, b)
+    {
+        return Err(Failure::Usage(anyhow!("--record-queries {}: the statistics are written there", b.display())));
+    }
+    for path in [Some(&exr), Some(&png), args.stats.as_ref(), args.record_queries.as_ref()].into_iter().flatten() {
         check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
     }
     Ok(Output { exr, png })

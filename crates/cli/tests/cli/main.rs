@@ -4,6 +4,7 @@
 mod bad_input;
 mod compare;
 mod render;
+mod report;
 mod sandbox;
 mod scenes;
 #[cfg(target_os = "linux")]

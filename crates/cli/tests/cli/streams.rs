@@ -51,6 +51,13 @@ fn ctrl_c_stops_a_verification() {
     nothing_is_left_after_ctrl_c(&["verify", "--segments", "1e12", "--voxel", "32", "--stats", "fog.json"]);
 }
 
+#[test]
+fn ctrl_c_stops_a_recording_and_a_report() {
+    let queries = ["--max-queries", "1e12", "-D", "spp=1000", "--html", "fog.html", "--export", "fog"];
+    nothing_is_left_after_ctrl_c(&[&["report", "queries"], &queries[..]].concat());
+    nothing_is_left_after_ctrl_c(&["report", "thesis", "--scenes", "cbox_vol4", "--csv", "fog.csv"]);
+}
+
 fn nothing_is_left_after_ctrl_c(args: &[&str]) {
     let sandbox = Sandbox::new();
     let outcome = interrupted(&sandbox, args);
@@ -78,7 +85,7 @@ fn statistics_to_a_full_device() {
 }
 
 /// The commands that write to stdout.
-fn talkers() -> [(Sandbox, Vec<&'static str>); 6] {
+fn talkers() -> [(Sandbox, Vec<&'static str>); 7] {
     let compare = Sandbox::new();
     compare.render(&["-o", "a.exr"]);
     [
@@ -87,6 +94,7 @@ fn talkers() -> [(Sandbox, Vec<&'static str>); 6] {
         (Sandbox::new(), vec!["scene", "write", "cbox_vol2"]),
         (Sandbox::new(), vec!["verify", "--segments", "1000", "--voxel", "32"]),
         (Sandbox::new(), vec!["voxelize", "--voxel", "32"]),
+        (Sandbox::new(), vec!["report", "queries", "--voxel", "32", "--methods", "ndf", "--max-queries", "999"]),
         (compare, vec!["compare", "a.exr", "a.exr"]),
     ]
 }

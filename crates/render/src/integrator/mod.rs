@@ -10,15 +10,15 @@ use crate::{
     frame::sample_cosine_hemisphere,
     geometry::{Hit, Segment},
     scene::{IntegratorSettings, MediumId, Phase},
-    visibility::{Counters, Proofs, QueryKind, ShadowQuery, Visibility},
+    visibility::{Counters, Proofs, QueryKind, Recorder, ShadowQuery, Visibility},
     world::{SurfacePoint, World},
 };
 
 /// One of the integrators, bound to a scene and a method of acceleration.
 #[derive(Debug)]
-pub(crate) struct Integrator<'a, P> {
+pub(crate) struct Integrator<'a, P, R> {
     pub(crate) world: &'a World,
-    pub(crate) visibility: Visibility<'a, P>,
+    pub(crate) visibility: Visibility<'a, P, R>,
     pub(crate) settings: IntegratorSettings,
     pub(crate) transmittance: TransmittanceEstimator,
 }
@@ -73,7 +73,7 @@ enum Vertex {
     OnSurface(SurfacePoint),
 }
 
-impl<P: Proofs> Integrator<'_, P> {
+impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
     /// True if a vertex at `depth` scattering events before it may still be followed.
     #[inline]
     fn may_scatter(&self, depth: u32) -> bool {

@@ -12,10 +12,10 @@ use crate::{
     Rgb, Sampler,
     geometry::Segment,
     media::Flight,
-    visibility::{Counters, Proofs},
+    visibility::{Counters, Proofs, Recorder},
 };
 
-impl<P: Proofs> Integrator<'_, P> {
+impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
     /// Radiance along `ray` by ray marching with `samples` strata a segment (at least 1).
     pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);

@@ -15,7 +15,7 @@ use crate::{
     geometry::Hit,
     media::Flight,
     scene::MediumId,
-    visibility::{Counters, Proofs},
+    visibility::{Counters, Proofs, Recorder},
 };
 
 /// What a ray comes to.
@@ -26,7 +26,7 @@ enum Event {
     Arrival { hit: Option<Hit>, medium: Option<MediumId> },
 }
 
-impl<P: Proofs> Integrator<'_, P> {
+impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
     /// Radiance along `ray` by volumetric path tracing.
     pub(crate) fn volpath(&self, ray: PathRay, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);

@@ -1,0 +1,141 @@
+//! The command line of `vdf report`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::{IntegratorName, Methods, parse_count, parse_define};
+
+/// Measure, and write what was measured as a page, as CSV or as JSON.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  vdf report queries cbox_vol4 --voxel 4,8,16       what a query costs, by each method and by the hierarchy alone
+  vdf report thesis --quick --html thesis.html      the tables of the thesis beside this program's, in miniature")]
+pub(crate) struct ReportArgs {
+    #[command(subcommand)]
+    pub(crate) command: ReportCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum ReportCommand {
+    Queries(ReportQueriesArgs),
+    Thesis(ReportThesisArgs),
+}
+
+/// Replay the visibility queries of a render, per method: what a query and a proof cost, and what that gains.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Every answer of every method is compared with that of the hierarchy before anything is timed. Times are
+nanoseconds a query, medians of passes over the whole stream that take turns; no timer runs inside a pass.
+
+  t_query   the hierarchy alone              p_acc|sp  share of the spatial queries that are proved
+  t_acc     the attempt of a proof           u         1 - p_acc|sp, the unknown fraction
+  t_eff     the proof, else the hierarchy    speed-up  t_query / t_eff, below 1 the method loses
+
+--export writes triangles.bin and queries.bin, to time other programs on the same queries; the formats are in
+docs/query-streams.md.
+
+Examples:
+  vdf report queries                                     records volpath's queries in cbox_vol2 and replays them
+  vdf report queries cbox_vol4 --voxel 4,8,16 --integrator raymarch --samples-per-segment 49 --html fog.html
+  vdf render scape --record-queries scape.vdfq && vdf report queries scape --queries scape.vdfq --methods amr,amr-sn
+  vdf report queries san-miguel --export court           the same queries for another program
+
+Exit codes: 0 done, 1 an answer is wrong or a file cannot be written, 2 usage or scene error, 130 interrupted."
+)]
+pub(crate) struct ReportQueriesArgs {
+    /// A scene file (a subset of Mitsuba 3 XML) or the name of a built-in scene [default: cbox_vol2]
+    pub(crate) scene: Option<PathBuf>,
+    /// Methods, separated by commas; the hierarchy alone is always measured
+    #[arg(long, default_value = "all", value_name = "all|METHOD", value_delimiter = ',')]
+    pub(crate) methods: Vec<Methods>,
+    /// Sides of voxels in world units, separated by commas [default: a 128th of the scene's longest side]
+    #[arg(long = "voxel", value_name = "SIZE", value_delimiter = ',', allow_negative_numbers = true)]
+    pub(crate) voxel_sizes: Vec<f64>,
+    /// Replay these queries, which vdf render --record-queries wrote, instead of recording some
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["integrator", "samples_per_segment", "spp", "seed", "max_queries"])]
+    pub(crate) queries: Option<PathBuf>,
+    /// Whose queries to record
+    #[arg(long, value_enum, default_value_t = IntegratorName::Volpath)]
+    pub(crate) integrator: IntegratorName,
+    /// Samples on each path segment, for raymarch only [default: 7]
+    #[arg(long, value_name = "N")]
+    pub(crate) samples_per_segment: Option<u32>,
+    /// Samples per pixel of the render that is recorded [default: the scene's]
+    #[arg(long, value_name = "N")]
+    pub(crate) spp: Option<u32>,
+    /// Seed of the render that is recorded [default: the scene's]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// The most queries to record: those of whole paths, chosen at random but the same in every run
+    #[arg(long, default_value = "2e5", value_name = "N", value_parser = parse_count)]
+    pub(crate) max_queries: u64,
+    /// Passes that a median is taken of
+    #[arg(long, default_value_t = 7, value_name = "N")]
+    pub(crate) passes: u32,
+    /// Folder to write the triangles and the queries to, for other programs; made if it does not exist
+    #[arg(long, value_name = "DIR")]
+    pub(crate) export: Option<PathBuf>,
+    /// Set a parameter of the scene file; may be given several times
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
+    pub(crate) defines: Vec<(String, String)>,
+    /// Number of threads to record and to build; queries are timed on one [default: one for each processor]
+    #[arg(short = 'j', long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) files: ReportFiles,
+}
+
+/// Repeat the measurements of the thesis that the method comes from (chapter 6), each figure beside its own.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Tables 6.1, 6.2, 6.4 to 6.11 and Figure 6.7, for all methods, and the inequality 2.7: the gain that it
+predicts and the gain measured. Images are compared bit by bit between all methods. The times of renders are
+for one thread, as in the thesis, and scaled to its images of 512 x 512 pixels if these are smaller.
+
+At full size this takes most of a day; --size 128 a sixteenth of that, --quick two minutes.
+
+Examples:
+  vdf report thesis --quick                                     a look
+  vdf report thesis --size 128 --html thesis.html --csv thesis.csv
+  vdf report thesis --scenes scape --methods amr,amr-xsn        part of it
+
+Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2 usage error, 130 interrupted."
+)]
+pub(crate) struct ReportThesisArgs {
+    /// Scenes, separated by commas; cbox_vol2 and cbox_vol3 are in Tables 6.1 and 6.2 only
+    #[arg(long, value_name = "SCENE", value_delimiter = ',', default_value = "cbox_vol2,cbox_vol3,cbox_vol4,cbox_vol6,san-miguel,scape",
+        value_parser = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "san-miguel", "scape"])]
+    pub(crate) scenes: Vec<String>,
+    /// Methods, separated by commas
+    #[arg(long, default_value = "all", value_name = "all|METHOD", value_delimiter = ',')]
+    pub(crate) methods: Vec<Methods>,
+    /// Small images, the middle voxel size only, fewer repetitions
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Side of the images in pixels [default: 512, or 32 with --quick]
+    #[arg(long, value_name = "N")]
+    pub(crate) size: Option<u32>,
+    /// Seed of the renders
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) files: ReportFiles,
+}
+
+/// Where a report goes, beside the tables on stdout.
+#[derive(Debug, Args)]
+pub(crate) struct ReportFiles {
+    /// Write a page of tables and plots, all in one file
+    #[arg(long, value_name = "FILE.html")]
+    pub(crate) html: Option<PathBuf>,
+    /// Write every figure as CSV
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Write every figure as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) json: Option<PathBuf>,
+    /// No progress; the tables only
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}

@@ -1,0 +1,80 @@
+//! The figures of a report, one by one, for machines.
+
+use anyhow::{Context as _, anyhow};
+use serde::Serialize;
+
+use super::provenance::Provenance;
+
+/// One number with all that says what it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Figure {
+    /// The table it is in: of the thesis, or of this program's.
+    pub(super) table: String,
+    /// The scene.
+    pub(super) scene: String,
+    /// `volpath`, or `raymarch` with its samples per segment.
+    pub(super) integrator: String,
+    /// The method; empty where none is concerned.
+    pub(super) method: &'static str,
+    /// Side of a voxel in world units.
+    pub(super) voxel_size: Option<f64>,
+    /// What is measured.
+    pub(super) quantity: &'static str,
+    /// Unit; empty for a ratio or a count.
+    pub(super) unit: &'static str,
+    /// The value.
+    pub(super) value: f64,
+    /// What the thesis has for it.
+    pub(super) thesis: Option<f64>,
+}
+
+/// What the figures of a group have in common.
+#[derive(Clone, Debug)]
+pub(super) struct About {
+    pub(super) table: &'static str,
+    pub(super) scene: String,
+    pub(super) integrator: String,
+    pub(super) method: &'static str,
+    pub(super) voxel_size: Option<f64>,
+}
+
+impl About {
+    pub(super) fn figure(&self, quantity: &'static str, unit: &'static str, value: f64, thesis: Option<f64>) -> Figure {
+        Figure {
+            table: self.table.to_owned(),
+            scene: self.scene.clone(),
+            integrator: self.integrator.clone(),
+            method: self.method,
+            voxel_size: self.voxel_size,
+            quantity,
+            unit,
+            value,
+            thesis,
+        }
+    }
+}
+
+/// The figures as CSV after lines that begin with `#` and say where they come from.
+pub(super) fn write_csv(figures: &[Figure], provenance: &Provenance) -> anyhow::Result<String> {
+    let mut text = Vec::new();
+    for (name, value) in provenance.entries() {
+        text.extend_from_slice(format!("# {name}: {}\n", value.replace(['\n', '\r'], " ")).as_bytes());
+    }
+    let mut writer = csv::Writer::from_writer(text);
+    for figure in figures {
+        writer.serialize(figure).context("cannot express the figures as CSV")?;
+    }
+    let text = writer.into_inner().map_err(|e| anyhow!("cannot express the figures as CSV: {e}"))?;
+    Ok(String::from_utf8(text)?)
+}
+
+/// The figures as JSON: `provenance` and `figures`. What is not finite is null.
+pub(super) fn write_json(figures: &[Figure], provenance: &Provenance) -> anyhow::Result<String> {
+    #[derive(Serialize)]
+    struct Report<'a> {
+        provenance: &'a Provenance,
+        figures: &'a [Figure],
+    }
+    let json = serde_json::to_string_pretty(&Report { provenance, figures });
+    Ok(json.context("cannot express the figures as JSON")? + "\n")
+}

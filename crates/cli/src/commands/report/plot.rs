@@ -1,0 +1,131 @@
+//! Plots, laid out in numbers; the template draws them as SVG.
+
+use serde::Serialize;
+
+/// Lines over logarithmic axes, ready to draw.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Plot {
+    title: String,
+    x_label: String,
+    y_label: String,
+    /// Places and labels of the ticks.
+    x_ticks: Vec<(f64, String)>,
+    y_ticks: Vec<(f64, String)>,
+    series: Vec<DrawnSeries>,
+    /// Frame of the data: left, top, right, bottom.
+    frame: [f64; 4],
+    size: [f64; 2],
+}
+
+/// A line to plot.
+#[derive(Clone, Debug)]
+pub(super) struct Series {
+    pub(super) name: String,
+    pub(super) points: Vec<(f64, f64)>,
+    /// Number of its colour.
+    pub(super) colour: usize,
+    /// 0 is solid, others are dashed in different ways.
+    pub(super) dash: usize,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct DrawnSeries {
+    name: String,
+    points: Vec<(f64, f64)>,
+    colour: usize,
+    dash: usize,
+}
+
+const SIZE: [f64; 2] = [480.0, 300.0];
+const FRAME: [f64; 4] = [56.0, 12.0, 468.0, 254.0];
+
+/// Number of colours in the template.
+pub(super) const COLOURS: usize = 6;
+
+impl Plot {
+    /// Lines over axes that are both logarithmic. What is not positive and finite is left out; `None` if nothing remains.
+    pub(super) fn logarithmic(title: String, x_label: &str, y_label: &str, series: Vec<Series>) -> Option<Self> {
+        let series: Vec<Series> = series
+            .into_iter()
+            .map(|mut s| {
+                s.points.retain(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
+                s
+            })
+            .filter(|s| !s.points.is_empty())
+            .collect();
+        if series.is_empty() {
+            return None;
+        }
+        let [left, top, right, bottom] = FRAME;
+        let points = || series.iter().flat_map(|s| &s.points);
+        let x = Axis::covering(points().map(|p| p.0), left, right);
+        let y = Axis::covering(points().map(|p| p.1), bottom, top);
+        let drawn = series
+            .iter()
+            .map(|s| DrawnSeries {
+                name: s.name.clone(),
+                points: s.points.iter().map(|p| (x.place(p.0), y.place(p.1))).collect(),
+                colour: s.colour % COLOURS,
+                dash: s.dash,
+            })
+            .collect();
+        Some(Self {
+            title,
+            x_label: x_label.to_owned(),
+            y_label: y_label.to_owned(),
+            x_ticks: x.ticks(),
+            y_ticks: y.ticks(),
+            series: drawn,
+            frame: FRAME,
+            size: SIZE,
+        })
+    }
+}
+
+/// A logarithmic axis.
+struct Axis {
+    /// Decimal logarithms of the ends.
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+}
+
+impl Axis {
+    fn covering(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+        let (low, high) =
+            values.map(f64::log10).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let margin = (0.05 * (high - low)).max(0.05);
+        Self { low: low - margin, high: high + margin, from, to }
+    }
+
+    fn place(&self, value: f64) -> f64 {
+        let share = (value.log10() - self.low) / (self.high - self.low);
+        let place = self.from + share * (self.to - self.from);
+        (10.0 * place).round() / 10.0
+    }
+
+    /// Ticks at 1, 2 and 5 times powers of ten, or at powers of ten alone where those would be many.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let steps: &[f64] = if self.high - self.low < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let stride = ((self.high - self.low) / 6.0).ceil().max(1.0) as i32;
+        let exponents = self.low.floor() as i32..=self.high.ceil() as i32;
+        exponents
+            .filter(|e| e.rem_euclid(stride) == 0)
+            .flat_map(|e| steps.iter().map(move |s| s * 10f64.powi(e)))
+            .filter(|v| (self.low..=self.high).contains(&v.log10()))
+            .map(|v| (self.place(v), label(v)))
+            .collect()
+    }
+}
+
+fn label(v: f64) -> String {
+    let whole = |x: f64| format!("{}", (1000.0 * x).round() / 1000.0);
+    match v {
+        v if v >= 1e9 => format!("{} G", whole(v / 1e9)),
+        v if v >= 1e6 => format!("{} M", whole(v / 1e6)),
+        v if v >= 1e4 => format!("{} k", whole(v / 1e3)),
+        v if v >= 1e-3 => whole(v),
+        v => format!("{v:.0e}"),
+    }
+}

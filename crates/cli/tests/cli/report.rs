@@ -1,0 +1,199 @@
+//! `vdf report` and `vdf render --record-queries`.
+
+use crate::sandbox::{Sandbox, TINY};
+
+const SMALL: [&str; 6] = ["-D", "width=12", "-D", "height=12", "-D", "spp=2"];
+
+fn json(sandbox: &Sandbox, name: &str) -> serde_json::Value {
+    serde_json::from_slice(&sandbox.read(name)).unwrap()
+}
+
+/// The value of a figure of a report.
+#[track_caller]
+fn figure(report: &serde_json::Value, quantity: &str, method: &str, voxel_size: Option<f64>) -> f64 {
+    let is = |f: &&serde_json::Value| {
+        f["quantity"] == quantity && f["method"] == method && f["voxel_size"].as_f64() == voxel_size
+    };
+    report["figures"].as_array().unwrap().iter().find(is).unwrap()["value"].as_f64().unwrap()
+}
+
+#[test]
+fn queries_are_recorded_and_replayed() {
+    let sandbox = Sandbox::new();
+    sandbox.render(&["-o", "plain.exr", "--stats", "fog.json", "--seed", "5"]);
+    let out = sandbox.render(&["-o", "fog.exr", "--record-queries", "fog.vdfq", "--seed", "5"]).stdout;
+    assert_eq!(sandbox.read("plain.png"), sandbox.read("fog.png"));
+    assert!(out.contains(" paths in fog.vdfq"), "{out}");
+    let statistics = json(&sandbox, "fog.json");
+    let size = sandbox.read("fog.vdfq").len() as u64;
+    assert_eq!(size, 80 + 56 * statistics["queries"].as_u64().unwrap());
+    // Any number of threads records the same.
+    sandbox.render(&["-o", "fog.exr", "--record-queries", "other.vdfq", "--seed", "5", "-j", "3", "--method", "none"]);
+    assert_eq!(sandbox.read("fog.vdfq"), sandbox.read("other.vdfq"));
+
+    let args = ["report", "queries", "--queries", "fog.vdfq", "--methods", "amr-sn,ndf,none", "--voxel", "16,32"];
+    let files =
+        ["--json", "r.json", "--csv", "r.csv", "--html", "r.html", "--export", "out", "--quiet", "--passes", "2"];
+    let text = sandbox.run(&[&args[..], &files, &TINY[..4]].concat()).succeeded().stdout;
+    let report = json(&sandbox, "r.json");
+    assert_eq!(figure(&report, "N", "none", None), statistics["queries"].as_f64().unwrap());
+    assert_eq!(figure(&report, "p_sp", "none", None), statistics["p_spatial"].as_f64().unwrap());
+    for (method, voxel) in [("amr-sn", 16.0), ("amr-sn", 32.0), ("ndf", 16.0), ("ndf", 32.0)] {
+        let value = |quantity: &str| figure(&report, quantity, method, Some(voxel));
+        assert!((value("p_acc|sp") + value("u") - 1.0).abs() < 1e-12 && value("p_acc|sp") > 0.0);
+        assert!((value("speed-up") / (value("t_query spatial") / value("t_eff")) - 1.0).abs() < 1e-9);
+        assert!(text.contains(&format!("{method} at {voxel} (")), "{text}");
+    }
+    assert_eq!(report["provenance"]["seed"], 5);
+    for name in ["command", "version", "profile", "rustc", "cpu", "cores", "os"] {
+        assert!(!report["provenance"][name].is_null(), "{name}");
+    }
+    assert!(report["provenance"]["command"].as_str().unwrap().contains(" report queries --queries fog.vdfq"));
+    // The CSV has the same figures, after lines that say where they come from.
+    let csv = String::from_utf8(sandbox.read("r.csv")).unwrap();
+    assert!(csv.starts_with("# command: ") && csv.contains("\n# processor: "), "{csv}");
+    let rows = csv.lines().filter(|l| !l.starts_with('#')).count();
+    assert_eq!(rows, 1 + report["figures"].as_array().unwrap().len());
+    // The exported stream is the one that was read.
+    assert_eq!(sandbox.read("out/queries.bin"), sandbox.read("fog.vdfq"));
+    assert_eq!(sandbox.read("out/triangles.bin").len(), 32 + 36 * 30);
+}
+
+#[test]
+fn a_page_is_one_well_formed_file() {
+    let sandbox = Sandbox::new();
+    sandbox.run(&["scene", "write", "cbox_vol2"]).succeeded();
+    std::fs::rename(sandbox.path().join("cbox_vol2.xml"), sandbox.path().join("a <b> & \"c\".xml")).unwrap();
+    let args = [
+        "report",
+        "queries",
+        "a <b> & \"c\".xml",
+        "--methods",
+        "amr-sn,ndf",
+        "--voxel",
+        "16,32",
+        "--passes",
+        "1",
+        "-q",
+    ];
+    sandbox.run(&[&args[..], &["--html", "r.html"], &SMALL].concat()).succeeded();
+    let page = String::from_utf8(sandbox.read("r.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("<h1>Visibility queries in a &lt;b&gt; &amp; &quot;c&quot;</h1>"), "{page}");
+    assert_eq!((page.matches("<figure>").count(), page.matches("<table>").count()), (2, 2));
+}
+
+/// Well formed, nothing loaded, both colour schemes, usable on a phone.
+#[track_caller]
+fn check_page(page: &str) {
+    // As XML: the doctype and the elements without an end are HTML's.
+    let mut xml = page.replace("<!doctype html>", "");
+    for name in ["meta", "link", "img"] {
+        let mut parts = xml.split(&format!("<{name} ")).map(str::to_owned).collect::<Vec<_>>();
+        for part in &mut parts[1..] {
+            let end = part.find('>').unwrap();
+            part.insert(end, '/');
+        }
+        xml = parts.join(&format!("<{name} "));
+    }
+    let options = roxmltree::ParsingOptions { allow_dtd: false, nodes_limit: u32::MAX };
+    let document = roxmltree::Document::parse_with_options(&xml, options).unwrap_or_else(|e| panic!("{e}\n{page}"));
+    for node in document.descendants().filter(roxmltree::Node::is_element) {
+        assert!(!["script", "iframe", "object"].contains(&node.tag_name().name()), "{node:?}");
+        for a in node.attributes().filter(|a| ["src", "href"].contains(&a.name())) {
+            assert!(a.value().starts_with("data:"), "{}", a.value());
+        }
+    }
+    assert!(!page.contains("url(") && !page.contains("@import"));
+    assert!(page.contains("prefers-color-scheme: dark") && page.contains("width=device-width"));
+    // Rows are as wide as the header.
+    for table in document.descendants().filter(|n| n.has_tag_name("table")) {
+        let cells = |name: &'static str| {
+            move |row: roxmltree::Node<'_, '_>| row.children().filter(|c| c.has_tag_name(name)).count()
+        };
+        let rows = || table.descendants().filter(|n| n.has_tag_name("tr"));
+        let columns = rows().map(cells("th")).max().unwrap();
+        assert!(rows().skip(1).count() > 0 && rows().skip(1).all(|row| cells("td")(row) == columns));
+    }
+    for number in document.descendants().filter(|n| n.has_tag_name("circle")).flat_map(|n| n.attributes()) {
+        assert!(["class", "r"].contains(&number.name()) || number.value().parse::<f64>().unwrap().is_finite());
+    }
+}
+
+#[test]
+fn the_thesis_in_miniature() {
+    let sandbox = Sandbox::new();
+    let args =
+        ["report", "thesis", "--quick", "--size", "4", "--scenes", "cbox_vol2,cbox_vol6", "--methods", "amr-sn,ndf"];
+    let files = ["--html", "t.html", "--csv", "t.csv", "--json", "t.json", "-q"];
+    let text = sandbox.run(&[&args[..], &files].concat()).succeeded().stdout;
+    for heading in
+        ["Table 6.1:", "Table 6.2:", "Table 6.4", "Tables 6.5 to 6.10: cbox_vol6", "Table 6.11", "Inequality 2.7"]
+    {
+        assert!(text.contains(heading), "no {heading} in {text}");
+    }
+    // Facts of the thesis in their places.
+    for cell in ["(54.34 %)", "(170.53 M)", "(68.18 %)", "77×73×169 (77×73×169)", "(14.0 ns)", "(75.0 ns)", "(18.9 s)"]
+    {
+        assert!(text.contains(cell), "no {cell} in {text}");
+    }
+    let page = String::from_utf8(sandbox.read("t.html")).unwrap();
+    check_page(&page);
+    assert!(page.contains("src=\"data:image/png;base64,iVBORw0KGgo"));
+    let report = json(&sandbox, "t.json");
+    let figures = report["figures"].as_array().unwrap();
+    // Two methods and the hierarchy, four settings.
+    let count = |table: &str| figures.iter().filter(|f| f["table"] == table).count();
+    assert_eq!(count("6.11"), 8);
+    assert_eq!(count("6.4"), 1 + 2 * 3);
+    assert_eq!(count("6.5-6.10"), 4 * (3 + 2 * 4));
+    assert_eq!(count("2.7"), 4 * 2 * 4);
+    assert_eq!((count("6.1"), count("6.2")), (3, 7));
+    assert!(figures.iter().all(|f| f["value"].is_f64()), "a figure is not finite");
+}
+
+#[test]
+fn failures() {
+    let sandbox = Sandbox::new();
+    sandbox.fails(&["report", "queries", "nothing.xml"], 2, &["nothing.xml: no such file", "cbox_vol2"]);
+    sandbox.fails(&["report", "queries", "--methods", "none"], 2, &["--methods must name a method"]);
+    sandbox.fails(&["report", "queries", "--methods", "magic"], 2, &["magic", "amr-sn"]);
+    sandbox.fails(&["report", "queries", "--passes", "0"], 2, &["--passes must be at least 1"]);
+    sandbox.fails(&["report", "queries", "--voxel", "8,-1"], 2, &["--voxel must be a positive finite number, not -1"]);
+    sandbox.fails(&["report", "queries", "--max-queries", "0"], 2, &["--max-queries must be at least 1"]);
+    sandbox.fails(&["report", "queries", "--html", "no/x.html"], 1, &["cannot write no/x.html: No such file"]);
+    sandbox.fails(&["report", "queries", "--queries", "no.vdfq"], 2, &["no.vdfq: No such file or directory"]);
+    sandbox.fails(&["report", "queries", "--queries", "a", "--spp", "1"], 2, &["cannot be used with"]);
+    sandbox.fails(&["report", "thesis", "--scenes", "moon"], 2, &["moon", "san-miguel"]);
+    sandbox.fails(&["report", "thesis", "--size", "0"], 2, &["--size must be from 1 to 4096, not 0"]);
+    sandbox.fails(&["render", "--record-queries", "no/x.vdfq"], 1, &["cannot write no/x.vdfq: No such file"]);
+    sandbox.fails(&["render", "--record-queries", "a.exr", "-o", "a.exr"], 2, &["the image is written there"]);
+    sandbox.fails(&["render", "--record-queries", "a", "--max-queries", "0"], 2, &["--max-queries must be at least 1"]);
+    sandbox.fails(&["render", "--max-queries", "9"], 2, &["--record-queries"]);
+
+    // Queries of another scene, and damaged ones.
+    sandbox.render(&["--record-queries", "fog.vdfq", "-q"]);
+    sandbox.fails(
+        &["report", "queries", "cbox_vol3", "--queries", "fog.vdfq"],
+        2,
+        &["fog.vdfq: recorded in another scene", "name that scene"],
+    );
+    let mut bytes = sandbox.read("fog.vdfq");
+    bytes[80] ^= 1;
+    std::fs::write(sandbox.path().join("fog.vdfq"), &bytes).unwrap();
+    sandbox.fails(&["report", "queries", "--queries", "fog.vdfq"], 2, &["fog.vdfq: damaged"]);
+}
+
+/// An answer in the file that the hierarchy contradicts is a wrong answer: exit code 1, no report.
+#[test]
+fn a_wrong_answer_fails() {
+    let sandbox = Sandbox::new();
+    sandbox.render(&["--record-queries", "fog.vdfq", "-q"]);
+    let mut bytes = sandbox.read("fog.vdfq");
+    bytes[80 + 56 * 3 + 52] ^= 2;
+    let crc = crc32fast::hash(&bytes[80..]);
+    bytes[72..76].copy_from_slice(&crc.to_le_bytes());
+    std::fs::write(sandbox.path().join("fog.vdfq"), &bytes).unwrap();
+    let args = ["report", "queries", "--queries", "fog.vdfq", "--json", "r.json", "-q"];
+    sandbox.fails(&args, 1, &["WRONG ANSWER: none says", "of query 3, from ["]);
+}

@@ -1,0 +1,254 @@
+//! Streams in memory and in files. The format, version 1, is described byte by byte in `docs/query-streams.md`: a header of 80 bytes,
+//! and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles that they are about.
+
+use std::{
+    fs::File,
+    io::{self, BufReader, Read},
+    path::Path,
+};
+
+use glam::DVec3;
+
+use crate::{QueryKind, RenderError, ShadowQuery, Triangle, World, scene::Scene, write_atomically};
+
+const MAGIC: &[u8; 8] = b"VDFQUERY";
+const TRIANGLES_MAGIC: &[u8; 8] = b"VDFTRIAN";
+const VERSION: u32 = 1;
+const HEADER: usize = 80;
+const QUERY: usize = 56;
+const SPATIAL: u32 = 1;
+const UNOCCLUDED: u32 = 2;
+const ON_LIGHT: u32 = 4;
+
+/// Where the queries of a stream come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StreamOrigin {
+    /// Paths of the whole render.
+    pub paths: u64,
+    /// Paths whose queries are in the stream.
+    pub paths_recorded: u64,
+    /// Seed of the render.
+    pub seed: u64,
+    /// Samples per pixel of the render.
+    pub spp: u32,
+    /// Samples on each path segment for `raymarch`; `None` is `volpath`.
+    pub samples_per_segment: Option<u32>,
+    /// Number of occluding triangles.
+    pub triangles: u64,
+    /// CRC-32 of their vertices.
+    pub triangles_crc32: u32,
+    /// Number of emitters.
+    pub emitters: u32,
+}
+
+/// Queries in the order in which a render of one thread asks them, and the exact answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QueryStream {
+    /// Where they come from.
+    pub origin: StreamOrigin,
+    /// The queries.
+    pub queries: Vec<ShadowQuery>,
+    /// For each query whether it is unoccluded, as the hierarchy answered when it was recorded.
+    pub unoccluded: Vec<bool>,
+}
+
+impl QueryStream {
+    /// Number of spatial queries in the stream.
+    #[must_use]
+    pub fn spatial(&self) -> usize {
+        self.queries.iter().filter(|q| q.kind == QueryKind::Spatial).count()
+    }
+
+    /// N, the number of queries of the whole render, estimated from the paths recorded; exact if they are all.
+    #[must_use]
+    pub fn estimated_total(&self) -> Option<f64> {
+        let o = &self.origin;
+        (o.paths_recorded > 0).then(|| self.queries.len() as f64 * (o.paths as f64 / o.paths_recorded as f64))
+    }
+
+    /// Writes the stream; the file appears whole or not at all.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        let mut crc = crc32fast::Hasher::new();
+        self.records().for_each(|record| crc.update(&record));
+        let o = &self.origin;
+        write_atomically(path, |out| {
+            out.write_all(MAGIC)?;
+            out.write_all(&VERSION.to_le_bytes())?;
+            out.write_all(&(HEADER as u32).to_le_bytes())?;
+            for n in [self.queries.len() as u64, o.paths, o.paths_recorded, o.seed] {
+                out.write_all(&n.to_le_bytes())?;
+            }
+            out.write_all(&o.spp.to_le_bytes())?;
+            out.write_all(&o.samples_per_segment.unwrap_or(0).to_le_bytes())?;
+            out.write_all(&o.triangles.to_le_bytes())?;
+            for n in [o.triangles_crc32, o.emitters, crc.finalize(), 0] {
+                out.write_all(&n.to_le_bytes())?;
+            }
+            self.records().try_for_each(|record| out.write_all(&record))
+        })
+    }
+
+    fn records(&self) -> impl Iterator<Item = [u8; QUERY]> + '_ {
+        self.queries.iter().zip(&self.unoccluded).map(|(q, &unoccluded)| {
+            let mut record = [0; QUERY];
+            let (numbers, integers) = record.split_at_mut(48);
+            let coordinates = q.from.to_array().into_iter().chain(q.to.to_array());
+            for (bytes, x) in numbers.chunks_exact_mut(8).zip(coordinates) {
+                bytes.copy_from_slice(&x.to_le_bytes());
+            }
+            let kind = match q.kind {
+                QueryKind::Spatial => SPATIAL,
+                QueryKind::OnLight => ON_LIGHT,
+                QueryKind::Superficial => 0,
+            };
+            let flags = kind | if unoccluded { UNOCCLUDED } else { 0 };
+            integers[..4].copy_from_slice(&(q.emitter as u32).to_le_bytes());
+            integers[4..].copy_from_slice(&flags.to_le_bytes());
+            record
+        })
+    }
+
+    /// Reads a stream that [`QueryStream::write`] wrote.
+    ///
+    /// # Errors
+    /// [`RenderError::Queries`] if the file cannot be read or is not such a stream, whole and unchanged.
+    pub fn read(path: &Path) -> Result<Self, RenderError> {
+        let fail = |message: String| RenderError::Queries { path: path.to_owned(), message };
+        let file = File::open(path).map_err(|e| fail(e.to_string()))?;
+        let length = file.metadata().map_err(|e| fail(e.to_string()))?.len();
+        let mut file = BufReader::new(file);
+        decode(&mut file, length).map_err(fail)
+    }
+
+    /// Checks that the stream was recorded in `scene`.
+    ///
+    /// # Errors
+    /// [`RenderError::Queries`], which names `path`, if the occluders or the emitters are others.
+    pub fn check_scene(&self, path: &Path, scene: &Scene, world: &World) -> Result<(), RenderError> {
+        let o = &self.origin;
+        let same = o.triangles == world.triangles.len() as u64
+            && o.emitters as usize == scene.emitters.len()
+            && o.triangles_crc32 == triangles_crc32(&world.triangles);
+        if same {
+            return Ok(());
+        }
+        let message = format!(
+            "recorded in another scene, of {} triangles and {} emitters (here: {} and {}); name that scene, with the same -D",
+            o.triangles,
+            o.emitters,
+            world.triangles.len(),
+            scene.emitters.len()
+        );
+        Err(RenderError::Queries { path: path.to_owned(), message })
+    }
+}
+
+/// Decodes a file of `length` bytes; the message of an error says what is wrong.
+fn decode(file: &mut impl Read, length: u64) -> Result<QueryStream, String> {
+    let mut header = [0; HEADER];
+    let read = |e: io::Error| match e.kind() {
+        io::ErrorKind::UnexpectedEof => "shorter than a file of queries; record it again".to_owned(),
+        _ => e.to_string(),
+    };
+    file.read_exact(&mut header).map_err(read)?;
+    if &header[..8] != MAGIC {
+        return Err("not a file of queries; make one with vdf render --record-queries".to_owned());
+    }
+    let u32_at = |i: usize| u32::from_le_bytes([header[i], header[i + 1], header[i + 2], header[i + 3]]);
+    let u64_at = |i: usize| u64::from(u32_at(i)) | u64::from(u32_at(i + 4)) << 32;
+    let (version, size) = (u32_at(8), u32_at(12) as usize);
+    if (version, size) != (VERSION, HEADER) {
+        return Err(format!(
+            "version {version} of the format with a header of {size} bytes; this program reads version {VERSION} with {HEADER}: record it again"
+        ));
+    }
+    let n = u64_at(16);
+    // Before any memory is taken for it.
+    if n.checked_mul(QUERY as u64).and_then(|b| b.checked_add(HEADER as u64)) != Some(length) {
+        return Err(format!("{length} bytes long, which does not fit {n} queries; record it again"));
+    }
+    let origin = StreamOrigin {
+        paths: u64_at(24),
+        paths_recorded: u64_at(32),
+        seed: u64_at(40),
+        spp: u32_at(48),
+        samples_per_segment: Some(u32_at(52)).filter(|&n| n > 0),
+        triangles: u64_at(56),
+        triangles_crc32: u32_at(64),
+        emitters: u32_at(68),
+    };
+    let mut stream = QueryStream { origin, queries: Vec::new(), unoccluded: Vec::new() };
+    let mut crc = crc32fast::Hasher::new();
+    let mut record = [0; QUERY];
+    for i in 0..n {
+        file.read_exact(&mut record).map_err(read)?;
+        crc.update(&record);
+        let (query, unoccluded) =
+            query(&record, &origin).ok_or_else(|| format!("query {i} makes no sense; record it again"))?;
+        stream.queries.push(query);
+        stream.unoccluded.push(unoccluded);
+    }
+    if crc.finalize() != u32_at(72) {
+        return Err("damaged, its checksum is wrong; record it again".to_owned());
+    }
+    Ok(stream)
+}
+
+/// The query of a record and its answer, if it makes sense.
+fn query(record: &[u8; QUERY], origin: &StreamOrigin) -> Option<(ShadowQuery, bool)> {
+    let (numbers, integers) = record.split_at(48);
+    let mut x = [0.0; 6];
+    for (x, bytes) in x.iter_mut().zip(numbers.chunks_exact(8)) {
+        *x = f64::from_le_bytes(bytes.try_into().ok()?);
+    }
+    let emitter = u32::from_le_bytes(integers[..4].try_into().ok()?);
+    let flags = u32::from_le_bytes(integers[4..].try_into().ok()?);
+    let (from, to) = (DVec3::new(x[0], x[1], x[2]), DVec3::new(x[3], x[4], x[5]));
+    let kind = match flags & !UNOCCLUDED {
+        0 => QueryKind::Superficial,
+        SPATIAL => QueryKind::Spatial,
+        ON_LIGHT => QueryKind::OnLight,
+        _ => return None,
+    };
+    let sound = from.is_finite() && to.is_finite() && emitter < origin.emitters;
+    sound.then_some((ShadowQuery { from, to, emitter: emitter as usize, kind }, flags & UNOCCLUDED != 0))
+}
+
+fn triangle_bytes(triangle: &Triangle) -> [u8; 36] {
+    let mut bytes = [0; 36];
+    let coordinates = triangle.vertices.iter().flat_map(|v| v.to_array());
+    for (bytes, x) in bytes.chunks_exact_mut(4).zip(coordinates) {
+        bytes.copy_from_slice(&x.to_le_bytes());
+    }
+    bytes
+}
+
+/// CRC-32 of the triangles as they are in the file of [`write_triangles`].
+pub(super) fn triangles_crc32(triangles: &[Triangle]) -> u32 {
+    let mut crc = crc32fast::Hasher::new();
+    triangles.iter().for_each(|t| crc.update(&triangle_bytes(t)));
+    crc.finalize()
+}
+
+/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 1, u32 size of this header 32, u64 number of triangles, u32
+/// CRC-32 of all that follows the header, u32 0; then nine f32 each, the coordinates of three vertices. They are the exact geometry that the answers of a
+/// [`QueryStream`] are about. The file appears whole or not at all.
+///
+/// # Errors
+/// What the system says.
+pub fn write_triangles(path: &Path, triangles: &[Triangle]) -> io::Result<()> {
+    write_atomically(path, |out| {
+        out.write_all(TRIANGLES_MAGIC)?;
+        for n in [VERSION, 32] {
+            out.write_all(&n.to_le_bytes())?;
+        }
+        out.write_all(&(triangles.len() as u64).to_le_bytes())?;
+        for n in [triangles_crc32(triangles), 0] {
+            out.write_all(&n.to_le_bytes())?;
+        }
+        triangles.iter().try_for_each(|t| out.write_all(&triangle_bytes(t)))
+    })
+}
