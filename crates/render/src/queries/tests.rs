@@ -233,7 +233,7 @@ fn every_single_wrong_answer_is_found() {
         let queries = stream.queries.iter().zip(&stream.unoccluded).enumerate();
         queries.filter(move |(_, (q, u))| (q.kind == QueryKind::Spatial, **u) == (spatial, unoccluded)).map(|(i, _)| i)
     };
-    let lies: Vec<usize> = classes(true, false).step_by(50).chain(classes(true, false).last()).collect();
+    let lies: Vec<usize> = classes(true, false).step_by(50).chain(classes(true, false).next_back()).collect();
     assert!(lies.len() > 3 && lies.last() > Some(&4096), "beyond the first block: {lies:?}");
     for about in lies {
         assert_eq!(acceleration.accept(CheckLiar { world: &world, stream: &stream, about }), Err(about));
