@@ -135,7 +135,8 @@ fn a_damaged_file_is_refused() {
     refused(&changed(80, &f64::NAN.to_le_bytes()), "query 0 makes no sense");
     refused(&changed(80 + 24, &f64::INFINITY.to_le_bytes()), "query 0 makes no sense");
     refused(&changed(80 + 56 + 48, &[1]), "query 1 makes no sense");
-    refused(&changed(80 + 56 + 52, &[4]), "query 1 makes no sense");
+    refused(&changed(80 + 56 + 52, &[5]), "query 1 makes no sense");
+    refused(&changed(80 + 56 + 52, &[8]), "query 1 makes no sense");
     // A changed bit that makes sense.
     refused(&changed(80, &[good[80] ^ 1]), "checksum");
     refused(&changed(80 + 52, &[good[80 + 52] ^ 2]), "checksum");
