@@ -75,7 +75,7 @@ const SPEED: f64 = 1.0 / 4096.0;
 /// The smallest component of a direction, 2⁻²³ of the largest; keeps reciprocals finite.
 const SMALLEST_COMPONENT: f32 = (SPEED * f32::EPSILON as f64) as f32;
 
-/// Segments that start farther away than this, in multiples of the largest coordinate, are not traced in single precision.
+/// Segments with both ends farther away than this, in multiples of the largest coordinate, are not traced in single precision.
 /// A point computed from the start is off by at most some 16·2⁻⁵³ times the start's distance: up to here by 2⁻²¹ of the
 /// largest coordinate, a small part of the half of [`PAD`] that its budget leaves over.
 const FAR: f64 = 268_435_456.0;
@@ -86,7 +86,9 @@ enum Approach {
     Miss,
     /// The tree's ray, and where it starts: the distance from the segment's start along its largest component, in world units.
     Ray(Ray, f64),
-    /// From so far away that single precision does not do; no tree is worth the trouble, all triangles are tested.
+    /// The tree's ray from the segment's end, because its start is too far away.
+    Backwards(Ray),
+    /// Both ends are so far away that single precision does not do. Hardly any such segment comes near; then all triangles are tested.
     Far,
 }
 
@@ -140,6 +142,8 @@ impl Bvh {
         let (ray, start) = match self.approach(&test) {
             Approach::Miss => return None,
             Approach::Ray(ray, start) => (ray, start),
+            // Last things first: nothing can be culled.
+            Approach::Backwards(ray) => (ray, f64::NEG_INFINITY),
             Approach::Far => {
                 return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
             }
@@ -165,7 +169,7 @@ impl Bvh {
         let test = SegmentTest::new(*segment, self.min, self.max);
         let ray = match self.approach(&test) {
             Approach::Miss => return false,
-            Approach::Ray(ray, _) => ray,
+            Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
             Approach::Far => return self.all_hits(&test).next().is_some(),
         };
         let mut occluded = false;
@@ -182,7 +186,7 @@ impl Bvh {
         let test = SegmentTest::new(*segment, self.min, self.max);
         let ray = match self.approach(&test) {
             Approach::Miss => return,
-            Approach::Ray(ray, _) => ray,
+            Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
             Approach::Far => return self.all_hits(&test).for_each(visit),
         };
         self.traverse(ray, |slot| {
@@ -233,30 +237,51 @@ impl Bvh {
     }
 
     #[inline]
-    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
     fn approach(&self, test: &SegmentTest) -> Approach {
         let direction = test.direction();
         if !(test.length() > 0.0 && direction.is_finite()) {
             return Approach::Miss;
         }
-        let (min, max) = (self.min - self.pad, self.max + self.pad);
-        let mut start = 0.0;
-        let mut origin = test.segment().p;
-        if !(origin.cmpge(min).all() && origin.cmple(max).all()) {
-            // The pad is in proportion to the largest coordinate.
-            if origin.abs().max_element() * PAD > FAR * self.pad {
-                return Approach::Far;
-            }
-            let inv = direction.recip();
-            let (t0, t1) = ((min - origin) * inv, (max - origin) * inv);
-            // A direction parallel to a slab gives NaN on its border: `min` and `max` then keep the other operand.
-            let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
-            if near > far || near > test.length() || far < 0.0 {
-                return Approach::Miss;
-            }
-            start = near.max(0.0);
-            origin += direction * start;
+        let Segment { p, q } = *test.segment();
+        if !self.is_far(p) {
+            return self
+                .ray(p, direction, test.length())
+                .map_or(Approach::Miss, |(ray, start)| Approach::Ray(ray, start));
         }
+        if !self.is_far(q) {
+            return self.ray(q, -direction, test.length()).map_or(Approach::Miss, |(ray, _)| Approach::Backwards(ray));
+        }
+        // The rounding of what `passes` computes, as for `FAR`.
+        let pad = self.pad + 16.0 * f64::EPSILON * p.abs().max_element();
+        self.passes(p, direction, test.length(), pad).map_or(Approach::Miss, |_| Approach::Far)
+    }
+
+    /// The pad is in proportion to the largest coordinate.
+    #[inline]
+    fn is_far(&self, p: DVec3) -> bool {
+        p.abs().max_element() * PAD > FAR * self.pad
+    }
+
+    /// Where a segment from `origin` comes to the bounds with this pad, if it does.
+    #[inline]
+    fn passes(&self, origin: DVec3, direction: DVec3, length: f64, pad: f64) -> Option<f64> {
+        let (min, max) = (self.min - pad, self.max + pad);
+        if origin.cmpge(min).all() && origin.cmple(max).all() {
+            return Some(0.0);
+        }
+        let inv = direction.recip();
+        let (t0, t1) = ((min - origin) * inv, (max - origin) * inv);
+        // A direction parallel to a slab gives NaN on its border: `min` and `max` then keep the other operand.
+        let (near, far) = (t0.min(t1).max_element(), t0.max(t1).min_element());
+        (near <= far && near <= length && far >= 0.0).then_some(near.max(0.0))
+    }
+
+    /// The tree's ray for a segment that starts here, and at which distance it starts.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
+    fn ray(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<(Ray, f64)> {
+        let start = self.passes(origin, direction, length, self.pad)?;
+        let origin = origin + direction * start;
         let direction = Vec3A::from((direction * SPEED).as_vec3());
         let small = direction.abs().cmple(Vec3A::splat(SMALLEST_COMPONENT));
         let direction = Vec3A::select(small, direction.signum() * SMALLEST_COMPONENT, direction);
@@ -265,9 +290,9 @@ impl Bvh {
             direction,
             inv_direction: direction.recip(),
             tmin: 0.0,
-            tmax: self.ray_parameter(test.length() - start),
+            tmax: self.ray_parameter(length - start),
         };
-        Approach::Ray(ray, start)
+        Some((ray, start))
     }
 
     /// The parameter of a tree's ray at this distance from its start (measured along the largest component), rounded up by more than the

@@ -176,6 +176,45 @@ fn hierarchy_finds_hits_far_from_the_origin() {
     }
 }
 
+/// Segments with one end or both up to 10¹⁵ times as far away as the scene is large, against a loop over all triangles; in either direction.
+#[test]
+fn far_ends_miss_nothing() {
+    let mut noise = crate::Sampler::new(5, 0, 0, 0);
+    let mut uniform = |size: f64| DVec3::from_array([(); 3].map(|()| size * (2.0 * noise.next_1d() - 1.0)));
+    let triangles: Vec<_> = (0..60_u8)
+        .map(|i| {
+            let [o, a, b] =
+                [uniform(8.0), uniform(2.0), uniform(if i % 3 == 0 { 1e-3 } else { 2.0 })].map(|v| v.as_vec3());
+            Triangle::new(o, o + a, o + b)
+        })
+        .collect();
+    let bvh = Bvh::new(&triangles);
+    let (min, max) = bvh.bounds().unwrap();
+    let (mut hits, mut crossings) = (0, 0);
+    for i in 0..6000 {
+        let t = triangles[if i % 2 == 0 { 0 } else { i % triangles.len() }].vertices_f64();
+        let target = [t[0], (t[0] + t[1]) * 0.5, t[0] * 0.98 + t[1] * 0.01 + t[2] * 0.01, uniform(9.0)][i / 7 % 4];
+        let away = uniform([2e3, 1e9, 1e12, 1e15][i / 2 % 4]);
+        let p = target + away;
+        // An end at the target, one behind it, and one as far away on the other side.
+        let q = [target, target - away.normalize() * 20.0, target - away][i / 5 % 3];
+        for s in [Segment::new(p, q), Segment::new(q, p)] {
+            let test = SegmentTest::new(s, min, max);
+            let found: Vec<_> = triangles.iter().filter_map(|t| test.intersect(t)).map(|h| h.t).collect();
+            assert_eq!(found.len(), triangles.iter().filter(|t| intersect_exact(&s, t).is_some()).count(), "{s:?}");
+            assert_eq!(bvh.occluded(&s), !found.is_empty(), "{s:?}");
+            let first = found.iter().copied().min_by(f64::total_cmp);
+            assert_eq!(bvh.intersect(&s).map(|h| h.t), first, "{s:?}");
+            let mut visited = 0;
+            bvh.visit_hits(&s, |_| visited += 1);
+            assert_eq!(visited, found.len(), "{s:?}");
+            hits += usize::from(visited > 0);
+            crossings += usize::from(visited > 1);
+        }
+    }
+    assert!(hits > 2000 && crossings > 100, "{hits} {crossings}");
+}
+
 /// Nothing divides coincident triangles, so the tree may be as deep as it likes.
 #[test]
 fn many_coincident_triangles_are_one() {
