@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{all_methods, builtin, ceiling_light, options, rendered};
+use common::{all_methods, builtin, options, rendered};
 use vdf::render::{
     IntegratorKind, Method, RenderOptions, Rgb, TransmittanceEstimator,
     scene::{PixelRect, Scene},
@@ -90,7 +90,7 @@ fn generated_scenes_are_alike_with_all_methods() {
 
 #[test]
 fn an_area_light_is_alike_with_all_methods() {
-    let scene = ceiling_light(&[("width", "24"), ("height", "20"), ("spp", "4")]);
+    let scene = builtin("cbox_light", &[("width", "24"), ("height", "20"), ("spp", "4")]);
     for integrator in INTEGRATORS {
         let (proving, images) =
             all_alike("ceiling light", &scene, &RenderOptions { integrator, ..options() }, &[8.0, 16.0]);

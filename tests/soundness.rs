@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Quiet, builtin, ceiling_light, cuboid, empty_scene};
+use common::{Quiet, builtin, cuboid, empty_scene};
 use glam::{DVec3, Vec3, dvec3, vec3};
 use vdf::render::{
     Rgb, Triangle,
@@ -49,7 +49,7 @@ fn builtin_scenes() {
 /// The light is an occluder, and shares its voxels with the ceiling.
 #[test]
 fn a_light_in_the_ceiling() {
-    sound("ceiling light", &ceiling_light(&[]), &[4.0, 8.0, 16.0, 100.0]);
+    sound("ceiling light", &builtin("cbox_light", &[]), &[4.0, 8.0, 16.0, 100.0]);
 }
 
 /// Slopes whose planes go through corners of voxels, exactly but for rounding: only the dilation decides on which side a corner is.

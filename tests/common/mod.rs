@@ -6,8 +6,8 @@ pub mod statistics;
 use vdf::render::{
     IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, TransmittanceEstimator, Triangle, render,
     scene::{
-        self, Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase,
-        PixelRect, ReconstructionFilter, Scene, Surface,
+        self, Boundary, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
+        ReconstructionFilter, Scene,
     },
 };
 
@@ -168,18 +168,4 @@ pub fn builtin(name: &str, defines: &[(&str, &str)]) -> Scene {
 /// The methods that prove something.
 pub fn all_methods() -> Vec<Method> {
     Method::ALL.into_iter().filter(|&m| m != Method::None).collect()
-}
-
-/// The Cornell box of `cbox_vol2` with its classic light in the ceiling in place of the point light.
-pub fn ceiling_light(defines: &[(&str, &str)]) -> Scene {
-    let mut scene = builtin("cbox_vol2", defines);
-    let corner = |x: f32, z: f32| vec3(x, 548.7, z);
-    let [a, b, c, d] = [corner(343.0, 227.0), corner(343.0, 332.0), corner(213.0, 332.0), corner(213.0, 227.0)];
-    scene.surfaces.push(Surface {
-        triangles: vec![Triangle::new(a, b, c), Triangle::new(a, c, d)],
-        bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
-        radiance: Some(Rgb::splat(15.0)),
-    });
-    scene.emitters = vec![Emitter::Area { surface: scene.surfaces.len() - 1 }];
-    scene
 }

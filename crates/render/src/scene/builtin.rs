@@ -8,7 +8,7 @@ use super::source::{EmbeddedFile, SceneSource};
 /// The scene that is rendered when none is named.
 pub const DEFAULT_SCENE: &str = "cbox_vol2";
 
-const NAMES: [&str; 6] = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "san-miguel", "scape"];
+const NAMES: [&str; 7] = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "cbox_light", "san-miguel", "scape"];
 
 macro_rules! scene_file {
     ($path:literal) => {
@@ -33,6 +33,7 @@ pub fn builtin(name: &str) -> Option<SceneSource> {
         "cbox_vol3" => scene_file!("cbox_vol3.xml"),
         "cbox_vol4" => scene_file!("cbox_vol4.xml"),
         "cbox_vol6" => scene_file!("cbox_vol6.xml"),
+        "cbox_light" => scene_file!("cbox_light.xml"),
         _ => return generated(name).map(in_memory),
     };
     let mut meshes = vec![

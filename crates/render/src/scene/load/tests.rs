@@ -76,7 +76,14 @@ fn the_builtin_boxes_load_and_say_what_the_design_says() {
         let sigma_t = if *name == "cbox_vol4" { 0.005 } else { 0.0005 };
         assert!((scene.media[0].sigma_t - sigma_t).abs() < 1e-12);
         assert_eq!(scene.emitters.len(), if *name == "cbox_vol3" { 2 } else { 1 });
-        assert_eq!(scene.surfaces.len(), if *name == "cbox_vol6" { 3 } else { 5 });
+        assert_eq!(
+            scene.surfaces.len(),
+            match *name {
+                "cbox_vol6" => 3,
+                "cbox_light" => 6,
+                _ => 5,
+            }
+        );
         let corner = |pick: fn(Vec3, Vec3) -> Vec3| {
             scene.boundaries[0].triangles.iter().flat_map(|t| t.vertices).reduce(pick).unwrap()
         };
@@ -464,7 +471,7 @@ fn a_shape_too_far_from_the_origin_is_refused() {
     refused(&at("10000000.3", 5.0), "3:1", "precision exhausted");
     refused(&at("1e9", 5.0), "3:1", "closer to the origin");
     refused(&at("0", 1e-44), "3:1", "precision exhausted");
-    for fine in [at("1e7", 5.0), at("10000000.3", 500.0), at("70.1", 0.01), at("0", 1e-40), at("0.1", 0.0)] {
+    for fine in [at("1e7", 5.0), at("10000000.3", 500.0), at("70.1", 0.01), at("0", 1e-40)] {
         load(&fine);
     }
 }
