@@ -1,5 +1,6 @@
 //! The command line as typed.
 
+mod convergence;
 mod report;
 
 use std::{path::PathBuf, str::FromStr};
@@ -7,6 +8,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use vdf_render::{Method, UnknownMethod, metrics::PIXELS_PER_DEGREE, scene::PixelRect};
 
+pub(crate) use convergence::ReportConvergenceArgs;
 pub(crate) use report::{ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportThesisArgs};
 
 /// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.

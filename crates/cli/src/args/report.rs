@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{IntegratorName, Methods, parse_count, parse_define};
+use super::{IntegratorName, Methods, ReportConvergenceArgs, parse_count, parse_define};
 
 /// Measure, and write what was measured as a page, as CSV or as JSON.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   vdf report queries cbox_vol4 --voxel 4,8,16       what a query costs, by each method and by the hierarchy alone
+  vdf report convergence --html convergence.html    speed against error, by each method and integrator
   vdf report thesis --quick --html thesis.html      the tables of the thesis beside this program's, in miniature")]
 pub(crate) struct ReportArgs {
     #[command(subcommand)]
@@ -19,6 +20,7 @@ pub(crate) struct ReportArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum ReportCommand {
     Queries(ReportQueriesArgs),
+    Convergence(ReportConvergenceArgs),
     Thesis(ReportThesisArgs),
 }
 

@@ -18,6 +18,10 @@ pub(super) struct Figure {
     pub(super) method: &'static str,
     /// Side of a voxel in world units.
     pub(super) voxel_size: Option<f64>,
+    /// Samples per pixel of the render, where renders differ in it.
+    pub(super) spp: Option<u32>,
+    /// Seed of the render, where the figure is about one of several.
+    pub(super) seed: Option<u64>,
     /// What is measured.
     pub(super) quantity: &'static str,
     /// Unit; empty for a ratio or a count.
@@ -46,11 +50,25 @@ impl About {
             integrator: self.integrator.clone(),
             method: self.method,
             voxel_size: self.voxel_size,
+            spp: None,
+            seed: None,
             quantity,
             unit,
             value,
             thesis,
         }
+    }
+}
+
+impl Figure {
+    /// Of renders with so many samples per pixel.
+    pub(super) fn of_spp(self, spp: u32) -> Self {
+        Self { spp: Some(spp), ..self }
+    }
+
+    /// Of the render with this seed.
+    pub(super) fn of_seed(self, seed: u64) -> Self {
+        Self { seed: Some(seed), ..self }
     }
 }
 

@@ -3,6 +3,7 @@
 //! A report makes [`Figure`]s, from which CSV and JSON follow, and a [`Page`] of tables and plots, from which the words on stdout and
 //! the HTML follow.
 
+mod convergence;
 mod figures;
 mod page;
 mod plot;
@@ -30,6 +31,7 @@ use crate::{
 pub(crate) fn run(command: &ReportCommand) -> Result<(), Failure> {
     match command {
         ReportCommand::Queries(args) => queries::run(args),
+        ReportCommand::Convergence(args) => convergence::run(args),
         ReportCommand::Thesis(args) => thesis::run(args),
     }
 }

@@ -23,6 +23,7 @@ pub(super) struct Section {
     pub(super) heading: String,
     pub(super) paragraphs: Vec<String>,
     pub(super) images: Vec<Picture>,
+    pub(super) comparisons: Vec<Comparison>,
     pub(super) plots: Vec<Plot>,
     pub(super) tables: Vec<Table>,
 }
@@ -35,6 +36,15 @@ pub(super) struct Picture {
     caption: String,
     width: u32,
     height: u32,
+}
+
+/// Two images of one size, one over the other, with a slider that moves the border between them; side by side without a script.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Comparison {
+    pub(super) caption: String,
+    /// Each with its own caption.
+    pub(super) left: Picture,
+    pub(super) right: Picture,
 }
 
 /// A table; the first column names the rows.
@@ -109,7 +119,7 @@ impl<T: Into<String>> From<T> for Cell {
 }
 
 impl Page {
-    /// The page in one file: no script, nothing loaded from elsewhere.
+    /// The page in one file: nothing loaded from elsewhere, no script but that of the sliders.
     pub(super) fn html(&self, provenance: &Provenance) -> anyhow::Result<String> {
         let mut environment = Environment::new();
         let syntax = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build();

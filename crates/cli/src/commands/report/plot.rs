@@ -17,6 +17,20 @@ pub(super) struct Plot {
     size: [f64; 2],
 }
 
+/// A line to plot, and between which lines it might lie as well; these have as many points, one for each of the line's own.
+#[derive(Clone, Debug)]
+pub(super) struct Banded {
+    pub(super) series: Series,
+    pub(super) low: Vec<(f64, f64)>,
+    pub(super) high: Vec<(f64, f64)>,
+}
+
+impl From<Series> for Banded {
+    fn from(series: Series) -> Self {
+        Self { series, low: vec![], high: vec![] }
+    }
+}
+
 /// A line to plot.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
@@ -32,6 +46,8 @@ pub(super) struct Series {
 struct DrawnSeries {
     name: String,
     points: Vec<(f64, f64)>,
+    /// The outline of the band; empty if there is none.
+    band: Vec<(f64, f64)>,
     colour: usize,
     dash: usize,
 }
@@ -44,29 +60,39 @@ pub(super) const COLOURS: usize = 6;
 
 impl Plot {
     /// Lines over axes that are both logarithmic. What is not positive and finite is left out; `None` if nothing remains.
-    pub(super) fn logarithmic(title: String, x_label: &str, y_label: &str, series: Vec<Series>) -> Option<Self> {
-        let series: Vec<Series> = series
+    pub(super) fn logarithmic<S: Into<Banded>>(
+        title: String,
+        x_label: &str,
+        y_label: &str,
+        series: Vec<S>,
+    ) -> Option<Self> {
+        let series: Vec<Banded> = series
             .into_iter()
-            .map(|mut s| {
-                s.points.retain(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
-                s
+            .map(|s| {
+                let Banded { mut series, mut low, mut high } = s.into();
+                for points in [&mut series.points, &mut low, &mut high] {
+                    points.retain(|(x, y)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite());
+                }
+                Banded { series, low, high }
             })
-            .filter(|s| !s.points.is_empty())
+            .filter(|s| !s.series.points.is_empty())
             .collect();
         if series.is_empty() {
             return None;
         }
         let [left, top, right, bottom] = FRAME;
-        let points = || series.iter().flat_map(|s| &s.points);
+        let points = || series.iter().flat_map(|s| s.series.points.iter().chain(&s.low).chain(&s.high));
         let x = Axis::covering(points().map(|p| p.0), left, right);
         let y = Axis::covering(points().map(|p| p.1), bottom, top);
+        let place = |p: &(f64, f64)| (x.place(p.0), y.place(p.1));
         let drawn = series
             .iter()
             .map(|s| DrawnSeries {
-                name: s.name.clone(),
-                points: s.points.iter().map(|p| (x.place(p.0), y.place(p.1))).collect(),
-                colour: s.colour % COLOURS,
-                dash: s.dash,
+                name: s.series.name.clone(),
+                points: s.series.points.iter().map(place).collect(),
+                band: s.low.iter().chain(s.high.iter().rev()).map(place).collect(),
+                colour: s.series.colour % COLOURS,
+                dash: s.series.dash,
             })
             .collect();
         Some(Self {
