@@ -18,6 +18,8 @@ pub(super) struct Figure {
     pub(super) method: &'static str,
     /// Side of a voxel in world units.
     pub(super) voxel_size: Option<f64>,
+    /// What the quantity was measured against, where that varies: triangles, voxels, lights or threads.
+    pub(super) against: Option<f64>,
     /// What is measured.
     pub(super) quantity: &'static str,
     /// Unit; empty for a ratio or a count.
@@ -46,6 +48,7 @@ impl About {
             integrator: self.integrator.clone(),
             method: self.method,
             voxel_size: self.voxel_size,
+            against: None,
             quantity,
             unit,
             value,

@@ -8,6 +8,7 @@ mod page;
 mod plot;
 mod provenance;
 mod queries;
+mod scaling;
 #[cfg(test)]
 mod tests;
 mod thesis;
@@ -30,6 +31,7 @@ use crate::{
 pub(crate) fn run(command: &ReportCommand) -> Result<(), Failure> {
     match command {
         ReportCommand::Queries(args) => queries::run(args),
+        ReportCommand::Scaling(args) => scaling::run(args),
         ReportCommand::Thesis(args) => thesis::run(args),
     }
 }
