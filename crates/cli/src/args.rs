@@ -9,7 +9,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use vdf_render::{Method, UnknownMethod, metrics::PIXELS_PER_DEGREE, scene::PixelRect};
 
 pub(crate) use convergence::ReportConvergenceArgs;
-pub(crate) use report::{ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportThesisArgs};
+pub(crate) use report::{
+    ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportScalingArgs, ReportThesisArgs,
+};
 
 /// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.
 #[derive(Debug, Parser)]

@@ -11,6 +11,7 @@ use super::{IntegratorName, Methods, ReportConvergenceArgs, parse_count, parse_d
 #[command(after_help = "Examples:
   vdf report queries cbox_vol4 --voxel 4,8,16       what a query costs, by each method and by the hierarchy alone
   vdf report convergence --html convergence.html    speed against error, by each method and integrator
+  vdf report scaling --html scaling.html            how costs grow with triangles, voxels, lights and threads
   vdf report thesis --quick --html thesis.html      the tables of the thesis beside this program's, in miniature")]
 pub(crate) struct ReportArgs {
     #[command(subcommand)]
@@ -21,6 +22,7 @@ pub(crate) struct ReportArgs {
 pub(crate) enum ReportCommand {
     Queries(ReportQueriesArgs),
     Convergence(ReportConvergenceArgs),
+    Scaling(ReportScalingArgs),
     Thesis(ReportThesisArgs),
 }
 
@@ -82,6 +84,63 @@ pub(crate) struct ReportQueriesArgs {
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub(crate) defines: Vec<(String, String)>,
     /// Number of threads to record and to build; queries are timed on one [default: one for each processor]
+    #[arg(short = 'j', long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) files: ReportFiles,
+}
+
+/// Measure how costs grow with triangles, voxels, lights and threads, and fit exponents.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Each sweep doubles one thing and leaves the others alone. Exponents are slopes of a least-squares line through the
+logarithms; the slope of the last step is beside them, since small sizes are not asymptotic.
+
+  triangles   san-miguel, 100000 and more: hierarchy, voxels, fields, memory, the time of a query and of a proof
+  voxels      cbox_vol2, as many as cubes of 32 and more a side: all fields and neighbourhoods, memory, t_acc, p_acc|sp
+  lights      cbox_vol2 with 1 and more point lights: neighbourhoods, memory, renders
+  threads     san-miguel: renders, voxels, fields; the efficiency of more than one
+
+Answers of proofs are compared with the hierarchy's, images bit by bit between methods and numbers of threads.
+
+Examples:
+  vdf report scaling --quick                                         a look
+  vdf report scaling --html scaling.html --csv scaling.csv           about three minutes on two cores
+  vdf report scaling --only triangles --max-triangles 1e7            8 GiB of memory
+  vdf report scaling --only voxels --max-voxels-per-side 512 --repetitions 3
+
+Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2 usage error, 130 interrupted."
+)]
+pub(crate) struct ReportScalingArgs {
+    /// Sweeps, separated by commas
+    #[arg(long, value_name = "SWEEP", value_delimiter = ',', default_value = "triangles,voxels,lights,threads",
+        value_parser = ["triangles", "voxels", "lights", "threads"])]
+    pub(crate) only: Vec<String>,
+    /// Smaller sizes, fewer repetitions
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// The most triangles, from 100000 to 10000000 [default: 1e6, or 4e5 with --quick]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    pub(crate) max_triangles: Option<u64>,
+    /// The most voxels, as the side of a cube, from 32 to 512 [default: 256, or 128 with --quick]
+    #[arg(long, value_name = "N")]
+    pub(crate) max_voxels_per_side: Option<u32>,
+    /// The most point lights, from 1 to 1024 [default: 64, or 16 with --quick]
+    #[arg(long, value_name = "N")]
+    pub(crate) max_lights: Option<u32>,
+    /// The most threads, from 1 to 1024 [default: one for each processor]
+    #[arg(long, value_name = "N")]
+    pub(crate) max_threads: Option<usize>,
+    /// Measurements that a median is taken of [default: 5, or 3 with --quick]
+    #[arg(long, value_name = "N")]
+    pub(crate) repetitions: Option<u32>,
+    /// Side of the images in pixels [default: 128, or 48 with --quick]
+    #[arg(long, value_name = "N")]
+    pub(crate) size: Option<u32>,
+    /// Seed of the renders
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) seed: u64,
+    /// Number of threads outside the sweep of threads; queries are timed on one [default: one for each processor]
     #[arg(short = 'j', long, value_name = "N")]
     pub(crate) threads: Option<usize>,
     #[command(flatten)]

@@ -153,6 +153,49 @@ fn the_thesis_in_miniature() {
 }
 
 #[test]
+fn scaling_in_miniature() {
+    let sandbox = Sandbox::new();
+    let small = ["--repetitions", "1", "--size", "8", "--max-voxels-per-side", "64", "--max-lights", "4"];
+    let files = ["--html", "s.html", "--csv", "s.csv", "--json", "s.json", "-q", "--max-threads", "3"];
+    let args = ["report", "scaling", "--quick", "--max-triangles", "2e5"];
+    let text = sandbox.run(&[&args[..], &small, &files].concat()).succeeded().stdout;
+    for word in ["## Triangles", "## Voxels", "## Lights", "## Threads", "slope of the last step", "Efficiency"] {
+        assert!(text.contains(word), "no {word} in {text}");
+    }
+    let page = String::from_utf8(sandbox.read("s.html")).unwrap();
+    check_page(&page);
+    assert_eq!((page.matches("<svg viewBox=\"0 0 480").count(), page.matches("<table>").count()), (12, 15));
+
+    let report = json(&sandbox, "s.json");
+    let figures = report["figures"].as_array().unwrap();
+    let values = |table: &str, quantity: &str| -> Vec<(Option<f64>, f64)> {
+        let chosen = figures.iter().filter(|f| f["table"] == table && f["quantity"] == quantity);
+        chosen.map(|f| (f["against"].as_f64(), f["value"].as_f64().unwrap())).collect()
+    };
+    // What does not depend on the clock.
+    let hierarchy = values("triangles: Memory", "hierarchy");
+    assert!(hierarchy.len() == 2 && hierarchy[0].1 > 36.0 * 1e5 && hierarchy[1].1 > 1.9 * hierarchy[0].1);
+    let per_voxel = |name| values("voxels: Memory", name).iter().map(|(x, y)| y / x.unwrap()).collect::<Vec<_>>();
+    for (bytes, least) in [(per_voxel("ndf"), 1.0), (per_voxel("amr"), 8.0)] {
+        assert!(bytes.len() == 2 && bytes.iter().all(|b| (least..1.2 * least).contains(b)), "{bytes:?}");
+    }
+    for (x, cube) in values("voxels: Memory", "ndf").iter().zip([32.0_f64, 64.0]) {
+        assert!((x.0.unwrap() / cube.powi(3) - 1.0).abs() < 0.15, "{x:?}");
+    }
+    let exponent = values("voxels: Memory, exponent", "ndf");
+    assert!(exponent.len() == 1 && (exponent[0].1 - 1.0).abs() < 0.05, "{exponent:?}");
+    assert!(values("voxels: Memory, standard error", "ndf").is_empty(), "two points have none");
+    let lights = values("lights: Memory of all neighbourhoods", "xsn");
+    assert_eq!(lights.iter().map(|l| l.0.unwrap()).collect::<Vec<_>>(), [1.0, 2.0, 4.0]);
+    assert!((lights[2].1 / lights[0].1 - 4.0).abs() < 1e-9, "{lights:?}");
+    let threads = values("threads: Time", "render, none");
+    assert_eq!(threads.iter().map(|t| t.0.unwrap()).collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
+    assert!(figures.iter().all(|f| f["value"].is_f64()), "a figure is not finite");
+    let csv = String::from_utf8(sandbox.read("s.csv")).unwrap();
+    assert!(csv.contains("\ntriangles: Memory,san-miguel,"), "{csv}");
+}
+
+#[test]
 fn failures() {
     let sandbox = Sandbox::new();
     sandbox.fails(&["report", "queries", "nothing.xml"], 2, &["nothing.xml: no such file", "cbox_vol2"]);
@@ -166,6 +209,20 @@ fn failures() {
     sandbox.fails(&["report", "queries", "--queries", "a", "--spp", "1"], 2, &["cannot be used with"]);
     sandbox.fails(&["report", "thesis", "--scenes", "moon"], 2, &["moon", "san-miguel"]);
     sandbox.fails(&["report", "thesis", "--size", "0"], 2, &["--size must be from 1 to 4096, not 0"]);
+    sandbox.fails(&["report", "scaling", "--only", "stars"], 2, &["stars", "triangles"]);
+    for (option, value, must) in [
+        ("max-triangles", "99999", "from 100000 to 10000000, not 99999"),
+        ("max-voxels-per-side", "513", "from 32 to 512, not 513"),
+        ("max-lights", "0", "from 1 to 1024, not 0"),
+        ("max-threads", "0", "from 1 to 1024, not 0"),
+        ("repetitions", "0", "from 1 to 1000, not 0"),
+        ("size", "0", "from 1 to 4096, not 0"),
+        ("threads", "0", "from 1 to 1024"),
+    ] {
+        let named = format!("--{option}");
+        sandbox.fails(&["report", "scaling", &named, value], 2, &[&format!("{named} must be {must}")]);
+    }
+    sandbox.fails(&["report", "scaling", "--csv", "no/x.csv"], 1, &["cannot write no/x.csv: No such file"]);
     sandbox.fails(&["render", "--record-queries", "no/x.vdfq"], 1, &["cannot write no/x.vdfq: No such file"]);
     sandbox.fails(&["render", "--record-queries", "a.exr", "-o", "a.exr"], 2, &["the image is written there"]);
     sandbox.fails(&["render", "--record-queries", "a", "--max-queries", "0"], 2, &["--max-queries must be at least 1"]);

@@ -133,6 +133,15 @@ impl Bvh {
         (!self.triangles.is_empty()).then_some((self.min, self.max))
     }
 
+    /// Bytes of the nodes and of the triangles in the order of the leaves, with their numbers.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.tree.nodes[..])
+            + size_of_val(&self.tree.primitive_indices[..])
+            + size_of_val(&self.triangles[..])
+            + size_of_val(&self.numbers[..])
+    }
+
     /// The first triangle that the closed segment meets. Cost: about 100 ns in a Cornell box.
     #[inline]
     #[must_use]

@@ -34,7 +34,7 @@ pub fn builtin(name: &str) -> Option<SceneSource> {
         "cbox_vol4" => scene_file!("cbox_vol4.xml"),
         "cbox_vol6" => scene_file!("cbox_vol6.xml"),
         "cbox_light" => scene_file!("cbox_light.xml"),
-        _ => return generated(name).map(in_memory),
+        _ => return generated(name).map(SceneSource::from),
     };
     let mut meshes = vec![
         scene_file!("meshes/cbox_white.obj"),
@@ -49,14 +49,20 @@ pub fn builtin(name: &str) -> Option<SceneSource> {
     Some(SceneSource::embedded(scene, meshes))
 }
 
-fn in_memory(scene: GeneratedScene) -> SceneSource {
-    let embedded = |file: GeneratedFile| {
-        let mut text = Vec::new();
-        // A vector takes whatever is written, and all that is written is UTF-8.
-        let _ = file.write(&mut text);
-        EmbeddedFile { path: Cow::Borrowed(file.path), text: Cow::Owned(String::from_utf8(text).unwrap_or_default()) }
-    };
-    let mut files: Vec<_> = scene.files().map(embedded).collect();
-    // The scene file is always there, and it is the first.
-    SceneSource::embedded(files.remove(0), files)
+impl From<GeneratedScene> for SceneSource {
+    /// The scene in memory: some 70 bytes of text a triangle.
+    fn from(scene: GeneratedScene) -> Self {
+        let embedded = |file: GeneratedFile| {
+            let mut text = Vec::new();
+            // A vector takes whatever is written, and all that is written is UTF-8.
+            let _ = file.write(&mut text);
+            EmbeddedFile {
+                path: Cow::Borrowed(file.path),
+                text: Cow::Owned(String::from_utf8(text).unwrap_or_default()),
+            }
+        };
+        let mut files: Vec<_> = scene.files().map(embedded).collect();
+        // The scene file is always there, and it is the first.
+        Self::embedded(files.remove(0), files)
+    }
 }

@@ -22,6 +22,8 @@ pub(super) struct Figure {
     pub(super) spp: Option<u32>,
     /// Seed of the render, where the figure is about one of several.
     pub(super) seed: Option<u64>,
+    /// What the quantity was measured against, where that varies: triangles, voxels, lights or threads.
+    pub(super) against: Option<f64>,
     /// What is measured.
     pub(super) quantity: &'static str,
     /// Unit; empty for a ratio or a count.
@@ -52,6 +54,7 @@ impl About {
             voxel_size: self.voxel_size,
             spp: None,
             seed: None,
+            against: None,
             quantity,
             unit,
             value,

@@ -9,6 +9,7 @@ mod page;
 mod plot;
 mod provenance;
 mod queries;
+mod scaling;
 #[cfg(test)]
 mod tests;
 mod thesis;
@@ -32,6 +33,7 @@ pub(crate) fn run(command: &ReportCommand) -> Result<(), Failure> {
     match command {
         ReportCommand::Queries(args) => queries::run(args),
         ReportCommand::Convergence(args) => convergence::run(args),
+        ReportCommand::Scaling(args) => scaling::run(args),
         ReportCommand::Thesis(args) => thesis::run(args),
     }
 }
