@@ -102,7 +102,7 @@ fn a_box_and_its_triangles_say_the_same() {
         (vec3(-26.0, -16.0, -790.0), vec3(584.0, 566.0, 560.0)),
         (Vec3::ZERO, Vec3::ONE),
         (vec3(1e6, -1e6, 3.0), vec3(1e6 + 1.0, -1e6 + 0.5, 3.0 + 1e-6)),
-        (vec3(-1e-30, -2e-30, 0.0), vec3(1e-30, 2e-30, 5e-30)),
+        (vec3(-1e-20, -2e-20, 0.0), vec3(1e-20, 2e-20, 5e-20)),
     ];
     let (mut left, mut short, mut gone) = (0, 0, 0);
     for (n, (min, max)) in (0..).zip(boxes) {
