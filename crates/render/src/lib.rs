@@ -40,7 +40,7 @@ pub use error::RenderError;
 pub use image::Image;
 pub use image_io::{AttributeValue, ImageError, ImageFormat, encode_png, read_exr, read_image, write_exr, write_png};
 pub use lights::{LightSample, Lights};
-pub use media::{Flight, Media};
+pub use media::{Flight, Media, Way};
 pub use mesh::Triangle;
 pub use method::{FieldKind, Method, NeighbourhoodKind, UnknownMethod};
 pub use options::{IntegratorKind, Progress, RenderOptions, TransmittanceEstimator, default_voxel_size};

@@ -12,6 +12,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use crate::{
+    Triangle,
     geometry::{Bvh, Segment},
     scene::{Boundary, Medium, MediumId},
 };
@@ -22,8 +23,10 @@ pub struct Media {
     media: Vec<Medium>,
     /// Interior and exterior of each boundary.
     sides: Vec<[Option<MediumId>; 2]>,
-    /// For each boundary: its bounds, and whether it is an axis-aligned box, inside which nothing of it is met.
-    bounds: Vec<(DVec3, DVec3, bool)>,
+    /// Where each boundary is.
+    bounds: Vec<Bounds>,
+    /// The only boundary, if that is a shut box in vacuum: who leaves it never meets a medium again.
+    only: Option<(DVec3, DVec3)>,
     /// Over the triangles of all boundaries.
     bvh: Bvh,
     /// For each of these triangles: the boundary it belongs to and its normal (of any length).
@@ -31,6 +34,81 @@ pub struct Media {
     /// Crossings closer than this are at one place, in world units: 2⁻⁴⁰ of the largest coordinate, far more than the rounding of `t`
     /// and far less than the step of single precision there.
     one_place: f64,
+}
+
+/// Where a boundary is, and what that says without a look at its triangles.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    min: DVec3,
+    max: DVec3,
+    /// Whether all of it lies in the faces of its bounds, so that inside them nothing of it is met.
+    hollow: bool,
+    /// Whether it is just the faces of its bounds, two triangles each, all of one orientation.
+    shut: bool,
+}
+
+impl Bounds {
+    fn of(triangles: &[Triangle]) -> Self {
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for v in triangles.iter().flat_map(Triangle::vertices_f64) {
+            min = min.min(v);
+            max = max.max(v);
+        }
+        // A triangle lies in a face of the bounds if its vertices share an extreme coordinate.
+        let in_a_face = |t: &Triangle| {
+            let [a, b, c] = t.vertices_f64();
+            (0..3).any(|k| a[k] == b[k] && b[k] == c[k] && (a[k] == min[k] || a[k] == max[k]))
+        };
+        Self { min, max, hollow: triangles.iter().all(in_a_face), shut: is_shut_box(triangles, min, max) }
+    }
+
+    /// True only if the segment starts inside the box and ends outside. Then it meets the boundary, and where it does it leaves: all faces
+    /// there have their normals on the same side of it, so that it is more than a touch.
+    #[inline]
+    fn is_left(&self, segment: &Segment) -> bool {
+        let Segment { p, q } = *segment;
+        self.shut
+            && p.cmpgt(self.min).all()
+            && p.cmplt(self.max).all()
+            && (q.cmplt(self.min).any() || q.cmpgt(self.max).any())
+    }
+}
+
+/// True if the triangles are the six faces of the box, each cut along a diagonal, with all normals outwards or all inwards.
+fn is_shut_box(triangles: &[Triangle], min: DVec3, max: DVec3) -> bool {
+    let mut covered = [[0_u32; 2]; 6];
+    let mut outwards = 0;
+    for t in triangles {
+        let vertices = t.vertices_f64();
+        let corner = |v: DVec3| {
+            let is_max = v.cmpeq(max).bitmask() as usize;
+            (is_max | v.cmpeq(min).bitmask() as usize == 7).then_some(is_max)
+        };
+        let [Some(a), Some(b), Some(c)] = vertices.map(corner) else { return false };
+        let (fixed_low, fixed_high) = (!(a | b | c) & 7, a & b & c);
+        // Three corners of one face have just one coordinate in common.
+        let (fixed, high) = (fixed_low | fixed_high, usize::from(fixed_high != 0));
+        let area = t.area_normal();
+        let axis = match fixed {
+            1 => 0,
+            2 => 1,
+            4 => 2,
+            _ => return false,
+        };
+        if area[axis] == 0.0 {
+            return false;
+        }
+        outwards += usize::from((area[axis] > 0.0) == (high == 1));
+        // The corner that a triangle leaves out; the other triangle of its face leaves out the opposite one.
+        let left_out = a ^ b ^ c;
+        let Some(slot) = covered[2 * axis + high].iter_mut().find(|slot| **slot == 0) else { return false };
+        *slot = 1 + left_out as u32;
+        let [first, second] = covered[2 * axis + high];
+        if second != 0 && (first - 1) ^ (second - 1) != (7 & !fixed) as u32 {
+            return false;
+        }
+    }
+    triangles.len() == 12 && min.cmplt(max).all() && (outwards == 0 || outwards == 12)
 }
 
 /// A part of a segment inside one medium (or in vacuum).
@@ -59,22 +137,11 @@ impl Media {
     /// Prepares media and boundaries.
     #[must_use]
     pub fn new(media: &[Medium], boundaries: &[Boundary]) -> Self {
-        let bounds = boundaries
-            .iter()
-            .map(|b| {
-                let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-                for v in b.triangles.iter().flat_map(crate::Triangle::vertices_f64) {
-                    min = min.min(v);
-                    max = max.max(v);
-                }
-                // A triangle lies in a face of the bounds if its vertices share an extreme coordinate.
-                let in_a_face = |t: &crate::Triangle| {
-                    let [a, b, c] = t.vertices_f64();
-                    (0..3).any(|k| a[k] == b[k] && b[k] == c[k] && (a[k] == min[k] || a[k] == max[k]))
-                };
-                (min, max, b.triangles.iter().all(in_a_face))
-            })
-            .collect();
+        let bounds: Vec<_> = boundaries.iter().map(|b| Bounds::of(&b.triangles)).collect();
+        let only = match (boundaries, bounds.as_slice()) {
+            ([Boundary { exterior: None, .. }], [Bounds { min, max, shut: true, .. }]) => Some((*min, *max)),
+            _ => None,
+        };
         let triangles: Vec<_> = boundaries.iter().flat_map(|b| b.triangles.iter().copied()).collect();
         let bvh = Bvh::new(&triangles);
         let largest = bvh.bounds().map_or(0.0, |(min, max)| min.abs().max(max.abs()).max_element());
@@ -84,6 +151,7 @@ impl Media {
             media: media.to_vec(),
             sides: boundaries.iter().map(|b| [b.interior, b.exterior]).collect(),
             bounds,
+            only,
             bvh,
             faces: faces.collect(),
             one_place: largest / (1_u64 << 40) as f64,
@@ -122,24 +190,23 @@ impl Media {
     #[must_use]
     pub fn fly(&self, segment: &Segment, start: Option<MediumId>, tau: f64) -> Flight {
         let length = segment.length();
-        let mut left = tau;
-        let mut last = start;
-        let found = self.walk(segment, start, |i| {
-            last = i.medium;
-            let depth = self.depth_of(&i, length);
-            if let Some(medium) = i.medium
-                && left < depth
-            {
-                let t = i.t0 + left / (self.medium(medium).sigma_t * length);
-                return ControlFlow::Break(Flight::Collision { t: t.min(i.t1), medium });
-            }
-            left -= depth;
-            ControlFlow::Continue(())
-        });
-        match found {
+        let mut flying = Flying { left: tau, last: start };
+        match self.walk(segment, start, |i| flying.through(self, &i, length)) {
             ControlFlow::Break(flight) => flight,
-            ControlFlow::Continue(()) => Flight::Passed(last),
+            ControlFlow::Continue(()) => Flight::Passed(flying.last),
         }
+    }
+
+    /// The way along the segment, for many flights: its boundaries are looked for once.
+    #[inline]
+    #[must_use]
+    pub fn way(&self, segment: &Segment, start: Option<MediumId>) -> Way<'_> {
+        let mut intervals = SmallVec::new();
+        let _ = self.walk(segment, start, |i| {
+            intervals.push(i);
+            ControlFlow::<()>::Continue(())
+        });
+        Way { media: self, length: segment.length(), start, intervals }
     }
 
     /// The way of a free flight to optical depth `tau` that starts in `medium`, if it ends in this medium before the segment does and meets
@@ -153,7 +220,29 @@ impl Media {
             return None;
         }
         let flight = Segment::new(segment.p, segment.at(t));
+        if self.bounds.iter().any(|b| b.is_left(&flight)) {
+            return None;
+        }
         (self.crosses_nothing(&flight) || self.crossings(&flight).is_empty()).then_some(flight)
+    }
+
+    /// True only if a flight to optical depth `tau`, if no surface stops it, does not collide: it starts in `medium`, leaves it where it is
+    /// shorter than that, and nothing comes behind. False says nothing.
+    ///
+    /// The segment must start in `medium`. *Why it is what [`Media::fly`] finds:* the boundary is one box, which is convex, with vacuum around it; where the flight
+    /// would end in an endless medium lies outside of it by more than a place, and so by far more than all rounding of
+    /// `fly`: 2⁻⁴⁰ of the largest coordinate beside some 2⁻⁴⁹.
+    #[inline]
+    #[must_use]
+    pub fn leaves_for_good(&self, segment: &Segment, medium: MediumId, tau: f64) -> bool {
+        let Some((min, max)) = self.only else { return false };
+        let t = tau / (self.medium(medium).sigma_t * segment.length());
+        // NaN, too, becomes 1.
+        let q = segment.at(t.min(1.0));
+        let p = segment.p;
+        p.cmpgt(min).all()
+            && p.cmplt(max).all()
+            && (q.cmplt(min - self.one_place).any() || q.cmpgt(max + self.one_place).any())
     }
 
     #[inline]
@@ -186,8 +275,10 @@ impl Media {
     #[inline]
     fn crosses_nothing(&self, segment: &Segment) -> bool {
         let (low, high) = (segment.p.min(segment.q), segment.p.max(segment.q));
-        self.bounds.iter().all(|&(min, max, is_box)| {
-            (is_box && low.cmpgt(min).all() && high.cmplt(max).all()) || low.cmpgt(max).any() || high.cmplt(min).any()
+        self.bounds.iter().all(|b| {
+            (b.hollow && low.cmpgt(b.min).all() && high.cmplt(b.max).all())
+                || low.cmpgt(b.max).any()
+                || high.cmplt(b.min).any()
         })
     }
 
@@ -216,6 +307,67 @@ impl Media {
     }
 }
 
+/// The intervals of a segment; see [`Media::way`].
+#[derive(Debug)]
+pub struct Way<'a> {
+    media: &'a Media,
+    length: f64,
+    start: Option<MediumId>,
+    intervals: SmallVec<[Interval; 4]>,
+}
+
+impl Way<'_> {
+    /// As [`Media::optical_depth`].
+    #[inline]
+    #[must_use]
+    pub fn optical_depth(&self) -> f64 {
+        self.intervals.iter().fold(0.0, |tau, i| tau + self.media.depth_of(i, self.length))
+    }
+
+    /// As [`Media::fly`].
+    #[inline]
+    #[must_use]
+    pub fn fly(&self, tau: f64) -> Flight {
+        let mut flying = Flying { left: tau, last: self.start };
+        match self.intervals.iter().try_for_each(|i| flying.through(self.media, i, self.length)) {
+            ControlFlow::Break(flight) => flight,
+            ControlFlow::Continue(()) => Flight::Passed(flying.last),
+        }
+    }
+
+    /// The medium at the end.
+    #[inline]
+    #[must_use]
+    pub fn end(&self) -> Option<MediumId> {
+        self.intervals.last().map_or(self.start, |i| i.medium)
+    }
+}
+
+/// A free flight under way.
+#[derive(Clone, Copy, Debug)]
+struct Flying {
+    /// Optical depth that is left to fly.
+    left: f64,
+    /// The medium of the last interval.
+    last: Option<MediumId>,
+}
+
+impl Flying {
+    #[inline]
+    fn through(&mut self, media: &Media, i: &Interval, length: f64) -> ControlFlow<Flight> {
+        self.last = i.medium;
+        let depth = media.depth_of(i, length);
+        if let Some(medium) = i.medium
+            && self.left < depth
+        {
+            let t = i.t0 + self.left / (media.medium(medium).sigma_t * length);
+            return ControlFlow::Break(Flight::Collision { t: t.min(i.t1), medium });
+        }
+        self.left -= depth;
+        ControlFlow::Continue(())
+    }
+}
+
 /// Where a segment crosses a boundary. Two triangles of one boundary that are met on their common edge give two crossings of the same
 /// effect, which is that of one.
 #[derive(Clone, Copy, Debug)]
@@ -229,3 +381,6 @@ struct Crossing {
 
 /// On the stack for all but pathological segments: no allocation in the loops of the integrators.
 type Crossings = SmallVec<[Crossing; 16]>;
+
+#[cfg(test)]
+mod tests;

@@ -146,6 +146,9 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
+        if self.is_beside(segment) {
+            return None;
+        }
         let test = SegmentTest::new(*segment, self.min, self.max);
         let mut best: Option<Hit> = None;
         let (ray, start) = match self.approach(&test) {
@@ -175,6 +178,9 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn occluded(&self, segment: &Segment) -> bool {
+        if self.is_beside(segment) {
+            return false;
+        }
         let test = SegmentTest::new(*segment, self.min, self.max);
         let ray = match self.approach(&test) {
             Approach::Miss => return false,
@@ -192,6 +198,9 @@ impl Bvh {
     /// Calls `visit` with every triangle that the closed segment meets, in no particular order.
     #[inline]
     pub fn visit_hits(&self, segment: &Segment, mut visit: impl FnMut(Hit)) {
+        if self.is_beside(segment) {
+            return;
+        }
         let test = SegmentTest::new(*segment, self.min, self.max);
         let ray = match self.approach(&test) {
             Approach::Miss => return,
@@ -206,6 +215,13 @@ impl Bvh {
         });
     }
 
+    /// True only if the bounds of the segment and of the triangles are disjoint: the usual case of a flight in fog beside all surfaces, found
+    /// before anything is divided.
+    #[inline]
+    pub(crate) fn is_beside(&self, segment: &Segment) -> bool {
+        segment.p.max(segment.q).cmplt(self.min).any() || segment.p.min(segment.q).cmpgt(self.max).any()
+    }
+
     /// Calls `visit` with the slots of all triangles in whose boxes the ray comes. The ray ends at the smallest parameter that `visit`
     /// returned; −∞ ends the traversal.
     #[inline(always)]
@@ -213,8 +229,8 @@ impl Bvh {
         if self.tree.nodes.is_empty() {
             return;
         }
-        // obvhs's own traversals have room for 32 levels, which is not enough where many triangles coincide.
-        fast_stack!(UVec2, (32), self.depth, stack, {
+        // obvhs's own traversals have room for 32 levels, which is not enough where many triangles coincide; and it takes time to clear them.
+        fast_stack!(UVec2, (4, 32), self.depth, stack, {
             let mut state = Traversal {
                 stack,
                 current_group: uvec2(0, 0x8000_0000),

@@ -7,11 +7,13 @@
 //! *Deviation from the thesis:* it recovers σ_t as −ln(T)/D, which loses all digits in thin media and is undefined where T underflows. Here the
 //! optical depth τ is known, and 1 − T = −expm1(−τ).
 
+use glam::DVec3;
+
 use super::{Integrator, Path, PathRay, Vertex, to_f32};
 use crate::{
     Rgb, Sampler,
     geometry::Segment,
-    media::Flight,
+    media::{Flight, Way},
     visibility::{Counters, Proofs, Recorder},
 };
 
@@ -21,28 +23,28 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
             let (hit, free) = self.cast(&path.ray, counters);
-            let tau = self.world.media.optical_depth(&free, path.ray.medium);
+            let way = self.world.media.way(&free, path.ray.medium);
+            let tau = way.optical_depth();
             if tau > 0.0 && self.may_scatter(path.depth + 1) {
-                path.radiance += path.throughput * self.in_scattered(&free, &path.ray, tau, samples, sampler, counters);
+                let light = self.in_scattered(&free, &way, path.ray.direction, tau, samples, sampler, counters);
+                path.radiance += path.throughput * light;
             }
-            let medium = match self.world.media.fly(&free, path.ray.medium, f64::INFINITY) {
-                Flight::Passed(medium) => medium,
-                Flight::Collision { medium, .. } => Some(medium),
-            };
             path.throughput *= to_f32((-tau).exp());
-            if !self.arrive(&mut path, hit, medium, sampler, counters) {
+            if !self.arrive(&mut path, hit, way.end(), sampler, counters) {
                 break;
             }
         }
         path.radiance
     }
 
-    /// Emitted light scattered once into the ray along `free`, whose optical depth is `tau`.
+    /// Emitted light scattered once into the ray along `free`, which goes the way `way` of optical depth `tau`.
     #[inline]
+    #[allow(clippy::too_many_arguments, reason = "what a ray has and what a path has")]
     fn in_scattered(
         &self,
         free: &Segment,
-        ray: &PathRay,
+        way: &Way<'_>,
+        direction: DVec3,
         tau: f64,
         samples: u32,
         sampler: &mut Sampler,
@@ -53,9 +55,9 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
         for k in 0..samples {
             let depth = stratum_depth(k, width, sampler.next_1d());
             // Rounding may place the last sample an ulp beyond the end; it is worth nothing there.
-            if let Flight::Collision { t, medium } = self.world.media.fly(free, ray.medium, depth) {
+            if let Flight::Collision { t, medium } = way.fly(depth) {
                 let m = self.world.media.medium(medium);
-                let vertex = Vertex::InMedium { phase: m.phase, direction: ray.direction };
+                let vertex = Vertex::InMedium { phase: m.phase, direction };
                 sum += m.albedo * self.direct_light_alone(free.at(t), &vertex, medium, sampler, counters);
             }
         }

@@ -73,6 +73,11 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
             };
         }
         let (hit, free) = self.cast(ray, counters);
+        if let (None, Some(medium)) = (hit, ray.medium)
+            && media.leaves_for_good(&ray.segment, medium, tau)
+        {
+            return Event::Arrival { hit, medium: None };
+        }
         match media.fly(&free, ray.medium, tau) {
             Flight::Collision { t, medium } => Event::Collision { point: free.at(t), medium },
             Flight::Passed(medium) => Event::Arrival { hit, medium },

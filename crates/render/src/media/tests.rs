@@ -1,0 +1,163 @@
+//! What is said of a box without a look at its triangles, against the walk over them: the same box with one more triangle, without area,
+//! which is met by nothing, is not taken for a shut box.
+
+use glam::{Vec3, dvec3, vec3};
+
+use super::*;
+use crate::{Rgb, Sampler, scene::Phase};
+
+const FOG: MediumId = MediumId(0);
+
+/// The twelve triangles of a box, normals outwards; `turned` picks the diagonals.
+fn cuboid(min: Vec3, max: Vec3, turned: u32) -> Vec<Triangle> {
+    let mut triangles = vec![];
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for high in [false, true] {
+            let corner = |a: bool, b: bool| {
+                let mut p = if high { max } else { min };
+                (p[u], p[v]) = (if a { max } else { min }[u], if b { max } else { min }[v]);
+                p
+            };
+            let mut ring = [corner(false, false), corner(true, false), corner(true, true), corner(false, true)];
+            ring.rotate_left((turned >> (2 * axis + usize::from(high)) & 1) as usize);
+            if !high {
+                ring.reverse();
+            }
+            triangles.extend([[0, 1, 2], [0, 2, 3]].map(|[a, b, c]| Triangle::new(ring[a], ring[b], ring[c])));
+        }
+    }
+    triangles
+}
+
+fn media(triangles: Vec<Triangle>, sigma_t: f64) -> Media {
+    let medium = Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
+    Media::new(&[medium], &[Boundary { triangles, interior: Some(FOG), exterior: None }])
+}
+
+fn is_shut(triangles: &[Triangle]) -> bool {
+    Bounds::of(triangles).shut
+}
+
+#[test]
+fn a_box_is_shut_if_nothing_is_missing() {
+    for turned in 0..64 {
+        let whole = cuboid(vec3(-1.0, 2.0, 0.5), vec3(3.0, 2.5, 9.0), turned);
+        assert!(is_shut(&whole));
+        let inwards: Vec<_> =
+            whole.iter().map(|t| Triangle::new(t.vertices[0], t.vertices[2], t.vertices[1])).collect();
+        assert!(is_shut(&inwards));
+        for i in 0..12 {
+            let changed = |f: &dyn Fn(&mut Vec<Triangle>)| {
+                let mut changed = whole.clone();
+                f(&mut changed);
+                assert!(Bounds::of(&changed).hollow || !is_shut(&changed));
+                is_shut(&changed)
+            };
+            assert!(
+                !changed(&|t| {
+                    t.remove(i);
+                }),
+                "one missing"
+            );
+            assert!(!changed(&|t| t[i].vertices.swap(0, 1)), "one turned over");
+            assert!(!changed(&|t| t[i] = whole[(i + 1) % 12]), "one twice");
+            assert!(!changed(&|t| t[i] = whole[(i + 6) % 12]), "a face without and one with too much");
+            assert!(!changed(&|t| t.push(whole[i])), "one too many");
+            assert!(!changed(&|t| t[i].vertices[0] = whole[i].vertices[1]), "one without area");
+            assert!(!changed(&|t| t[i].vertices[1].z += 0.25), "one out of place");
+            assert!(!changed(&|t| {
+                // The same half of a face as the other triangle's, from another corner.
+                let other = t[i ^ 1].vertices;
+                t[i].vertices = [other[1], other[2], other[0]];
+            }));
+            let across = [whole[i].vertices[0], whole[i].vertices[1], whole[(i + 2) % 12].vertices[2]];
+            assert!(!changed(&|t| t[i].vertices = across) || across == whole[i].vertices, "across the box");
+        }
+    }
+    assert!(!is_shut(&[]));
+    assert!(!is_shut(&cuboid(Vec3::ZERO, vec3(1.0, 0.0, 1.0), 0)), "flat");
+}
+
+/// Points in and about a box, of those where rounding could matter more than by chance.
+fn point(u: &mut Sampler, min: DVec3, max: DVec3) -> DVec3 {
+    let mut p = DVec3::ZERO;
+    for k in 0..3 {
+        let size = max[k] - min[k];
+        let ulp = |x: f64, n: f64| x + n * f64::EPSILON * x.abs();
+        p[k] = match (u.next_1d() * 12.0) as u32 {
+            0 => min[k],
+            1 => max[k],
+            2 => ulp(min[k], 2.0),
+            3 => ulp(max[k], -2.0),
+            4 => ulp(max[k], 2.0),
+            5 => min[k] - size * 1e6 * u.next_1d(),
+            6 => max[k] + size * 1e-12 * u.next_1d(),
+            7 => max[k] + size * u.next_1d(),
+            8 => min[k] + size * 0.5,
+            _ => min[k] + size * u.next_1d(),
+        };
+    }
+    p
+}
+
+#[test]
+fn a_box_and_its_triangles_say_the_same() {
+    let boxes = [
+        (vec3(-26.0, -16.0, -790.0), vec3(584.0, 566.0, 560.0)),
+        (Vec3::ZERO, Vec3::ONE),
+        (vec3(1e6, -1e6, 3.0), vec3(1e6 + 1.0, -1e6 + 0.5, 3.0 + 1e-6)),
+        (vec3(-1e-20, -2e-20, 0.0), vec3(1e-20, 2e-20, 5e-20)),
+    ];
+    let (mut left, mut short, mut gone) = (0, 0, 0);
+    for (n, (min, max)) in (0..).zip(boxes) {
+        let triangles = cuboid(min, max, 0b01_1010 + n);
+        let mut with_another = triangles.clone();
+        with_another.push(Triangle::new(min, min, max.with_x(min.x)));
+        let diagonal = f64::from((max - min).length());
+        let (fast, slow) = (media(triangles, 0.3 / diagonal), media(with_another, 0.3 / diagonal));
+        assert!(fast.bounds[0].shut && fast.only.is_some() && !slow.bounds[0].shut && slow.only.is_none());
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        for i in 0..60_000 {
+            let mut u = Sampler::new(7, i, n, 0);
+            let p = point(&mut u, min, max);
+            let segment = Segment::new(p, point(&mut u, min, max));
+            let segment = if i % 3 == 0 { Segment::new(p, p + (segment.q - p) * 1e6) } else { segment };
+            let tau = match i % 4 {
+                0 => 0.0,
+                // Just about where the segment ends.
+                1 => 0.3 / diagonal * segment.length() * (1.0 + (u.next_1d() - 0.5) * 1e-15),
+                _ => -(-u.next_1d()).ln_1p(),
+            };
+            let found = fast.short_flight(&segment, FOG, tau);
+            assert_eq!(found, slow.short_flight(&segment, FOG, tau), "{segment:?}, {tau}");
+            short += u32::from(found.is_some());
+            let t = tau / (0.3 / diagonal * segment.length());
+            left += u32::from(fast.bounds[0].is_left(&Segment::new(p, segment.at(t.min(1.0)))));
+            let (flight, depth) = (slow.fly(&segment, Some(FOG), tau), slow.optical_depth(&segment, Some(FOG)));
+            if fast.leaves_for_good(&segment, FOG, tau) {
+                gone += 1;
+                assert_eq!(flight, Flight::Passed(None), "{segment:?}, {tau}");
+            }
+            let way = fast.way(&segment, Some(FOG));
+            assert_eq!((way.fly(tau), way.optical_depth()), (flight, depth), "{segment:?}, {tau}");
+            let Flight::Passed(end) = slow.fly(&segment, Some(FOG), f64::INFINITY) else { panic!("collides with all") };
+            assert_eq!(way.end(), end);
+        }
+    }
+    assert!(left > 2000 && short > 2000 && gone > 2000, "{left} left the box, {short} did not, {gone} for good");
+}
+
+/// A box in a larger medium, and two boxes: whoever leaves one is not gone for good.
+#[test]
+fn nobody_is_gone_for_good_where_something_may_come() {
+    let segment = Segment::new(dvec3(0.5, 0.5, 0.5), dvec3(0.5, 0.5, 50.0));
+    let shape = cuboid(Vec3::ZERO, Vec3::ONE, 0);
+    let fog = Medium { sigma_t: 1.0, albedo: Rgb::ONE, phase: Phase::Isotropic };
+    let alone = Boundary { triangles: shape.clone(), interior: Some(FOG), exterior: None };
+    assert!(Media::new(&[fog], std::slice::from_ref(&alone)).leaves_for_good(&segment, FOG, 2.0));
+    let within = Boundary { exterior: Some(FOG), ..alone.clone() };
+    assert!(!Media::new(&[fog], &[within]).leaves_for_good(&segment, FOG, 2.0));
+    let behind = Boundary { triangles: cuboid(vec3(0.0, 0.0, 3.0), vec3(1.0, 1.0, 9.0), 0), ..alone.clone() };
+    assert!(!Media::new(&[fog], &[alone, behind]).leaves_for_good(&segment, FOG, 2.0));
+}
