@@ -3,7 +3,8 @@
 
 Each page is looked at on a desktop and on a phone, light and dark. It fails on messages of the console,
 on any request but for the page itself, on text that overlaps other text, leaves its plot or is too faint,
-and on a page that is wider than the screen.
+on a page that is wider than the screen, and on a slider that does not compare its pictures with mouse, finger
+and keyboard, or hides one of them where scripts do not run.
 """
 
 import argparse
@@ -71,9 +72,99 @@ FIND_PROBLEMS = r"""
 """
 
 
+# Where the upper picture of each comparison is cut off, in per cent from the left, and whether its border is there.
+CUTS = r"""
+() => [...document.querySelectorAll(".compare")].map((figure) => {
+  const pair = figure.querySelector(".pair"), upper = figure.querySelector(".over img");
+  const clip = getComputedStyle(upper).clipPath.match(/inset\(0(?:px|%)? 0(?:px|%)? 0(?:px|%)? ([\d.]+)%\)/);
+  const border = parseFloat(getComputedStyle(pair, "::after").marginLeft) + 1;
+  return {cut: clip ? Number(clip[1]) : null, border: 100 * border / pair.getBoundingClientRect().width};
+})
+"""
+
+BOXES = r"""
+() => [...document.querySelectorAll(".compare")].map((figure) => [...figure.querySelectorAll("img, span, input")].map((e) => {
+  const r = e.getBoundingClientRect();
+  return {kind: e.localName, l: r.left, r: r.right, t: r.top, b: r.bottom, shown: r.width > 0 && r.height > 0};
+}))
+"""
+
+
+def slider_problems(page, touch):
+    problems = []
+    cuts = lambda: page.evaluate(CUTS)
+
+    def expect(what, n, wanted):
+        found = cuts()[n]
+        for name in ("cut", "border"):
+            if found[name] is None or abs(found[name] - wanted) > 1.0:
+                problems.append(f"slider {n}, {what}: {name} at {found[name]}, not {wanted}")
+
+    for n, boxes in enumerate(page.evaluate(BOXES)):
+        pictures = [b for b in boxes if b["kind"] == "img"]
+        if any(abs(pictures[0][side] - pictures[1][side]) > 0.5 for side in "lrtb"):
+            problems.append(f"slider {n}: the pictures are not one over the other")
+        if pictures[0]["r"] - pictures[0]["l"] < 200:
+            problems.append(f"slider {n}: the pictures are too small")
+        if not all(b["shown"] for b in boxes):
+            problems.append(f"slider {n}: something is not shown")
+        thumb = next(b for b in boxes if b["kind"] == "input")
+        if thumb["b"] - thumb["t"] < 40:
+            problems.append(f"slider {n}: too low for a finger")
+    for n in range(page.locator(".compare").count()):
+        figure = page.locator(".compare").nth(n)
+        slider, pair = figure.locator("input"), figure.locator(".pair")
+        expect("at first", n, 50)
+        slider.focus()
+        if not page.evaluate("() => document.activeElement.matches('.compare input:focus-visible')"):
+            problems.append(f"slider {n}: no focus to be seen")
+        page.keyboard.press("ArrowRight")
+        expect("arrow right", n, 51)
+        page.keyboard.press("Home")
+        expect("home", n, 0)
+        page.keyboard.press("End")
+        expect("end", n, 100)
+        if slider.get_attribute("aria-valuetext") != "100 % from the left" or not slider.get_attribute("aria-label"):
+            problems.append(f"slider {n}: says nothing to a screen reader")
+        pair.scroll_into_view_if_needed()
+        box = pair.bounding_box()
+        x, y = box["x"] + 0.25 * box["width"], box["y"] + 0.4 * box["height"]
+        if touch:
+            page.touchscreen.tap(x, y)
+            expect("tap", n, 25)
+        else:
+            page.mouse.move(x, y)
+            page.mouse.down()
+            page.mouse.move(x + 0.5 * box["width"], y, steps=5)
+            expect("drag", n, 75)
+            page.mouse.up()
+            page.mouse.move(x, y)
+            expect("after the drag", n, 75)
+            if slider.input_value() != "75":
+                problems.append(f"slider {n}: does not follow the picture")
+        slider.fill("50")
+        expect("back", n, 50)
+    return problems
+
+
+def scriptless_problems(page):
+    """Both pictures of a comparison, with their labels, side by side; no slider."""
+    problems = []
+    for n, boxes in enumerate(page.evaluate(BOXES)):
+        for box in boxes:
+            if box["shown"] == (box["kind"] == "input"):
+                problems.append(f"slider {n} without scripts: {box['kind']} is {'' if box['shown'] else 'not '}shown")
+        a, b = [box for box in boxes if box["kind"] == "img"]
+        if a["r"] > b["l"] + 0.5:
+            problems.append(f"slider {n} without scripts: the pictures are not side by side")
+    return problems
+
+
 def problems_of(browser, path, screen, scheme, screenshot):
     width, height = SCREENS[screen]
-    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+    touch = screen == "phone"
+    settings = {"viewport": {"width": width, "height": height}, "color_scheme": scheme, "has_touch": touch}
+    context = browser.new_context(**settings)
     page = context.new_page()
     problems = []
     address = path.resolve().as_uri()
@@ -91,6 +182,12 @@ def problems_of(browser, path, screen, scheme, screenshot):
     problems += [f"image not shown: {alt}" for alt in broken]
     if screenshot:
         page.screenshot(path=screenshot / f"{path.stem}-{screen}-{scheme}.png", full_page=True)
+    problems += slider_problems(page, touch)
+    context.close()
+    context = browser.new_context(**settings, java_script_enabled=False)
+    page = context.new_page()
+    page.goto(address, wait_until="load")
+    problems += scriptless_problems(page)
     context.close()
     return problems
 

@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod compare;
+mod convergence;
 mod render;
 mod report;
 mod sandbox;

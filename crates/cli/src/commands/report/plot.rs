@@ -131,9 +131,13 @@ impl Axis {
         (10.0 * place).round() / 10.0
     }
 
-    /// Ticks at 1, 2 and 5 times powers of ten, or at powers of ten alone where those would be many.
+    /// Ticks at 1, 2 and 5 times powers of ten, at powers of ten alone where those would be many, at more where they would be few.
     fn ticks(&self) -> Vec<(f64, String)> {
-        let steps: &[f64] = if self.high - self.low < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let steps: &[f64] = match self.high - self.low {
+            decades if decades < 0.5 => &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],
+            decades if decades < 2.0 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
         let stride = ((self.high - self.low) / 6.0).ceil().max(1.0) as i32;
         let exponents = self.low.floor() as i32..=self.high.ceil() as i32;
         exponents

@@ -130,7 +130,7 @@ mod tests {
         }
         let coverage = |n| MedianRule::new(n);
         assert_eq!((coverage(5).k, coverage(5).coverage), (1, 0.9375));
-        assert_eq!((coverage(7).k, coverage(8).k, coverage(9).k), (1, 2, 2));
+        assert_eq!((coverage(7).k, coverage(8).k, coverage(9).k), (1, 1, 2));
         // The normal approximation: k = n/2 − z √n/2, with z = 1.8627 for 15/16.
         let most = MedianRule::new(MOST);
         assert!((most.k as f64 - (500.5 - 1.8627 * 1000_f64.sqrt() / 2.0)).abs() < 1.0, "{most:?}");

@@ -143,11 +143,11 @@ impl<'a> Tables<'a> {
             ),
             format!(
                 "Times are T_build + T_render where nothing else is said; the hierarchy, which every method needs, is not in them. Figures are \
-                 medians over {} seeds, with the interval from the smallest but {} to the largest but {}, which encloses the median of all \
+                 medians over {} seeds, with the interval from value {} to value {} in ascending order, which encloses the median of all \
                  seeds with a probability of {}; the bands of the plots join the lower ends, and the upper ones, of time and error. Methods took turns.",
                 plan.seeds.len(),
-                self.rule.k - 1,
-                self.rule.k - 1,
+                self.rule.k,
+                plan.seeds.len() + 1 - self.rule.k,
                 percent(self.rule.coverage),
             ),
         ];
