@@ -233,7 +233,34 @@ impl Builds {
         self.0.iter().flat_map(|(_, reports)| reports).map(|r| r.voxels).next().unwrap_or(0)
     }
 
+    /// Occupied voxels / voxels, the same for all methods.
+    pub(super) fn occupied_share(&self) -> f64 {
+        let report = self.0.iter().flat_map(|(_, reports)| reports).next();
+        report.map_or(0.0, |r| r.occupied as f64 / r.voxels as f64)
+    }
+
     fn of(&self, method: Method) -> impl Iterator<Item = &BuildReport> {
         self.0.iter().filter(move |(m, _)| *m == method).flat_map(|(_, reports)| reports)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use vdf_render::Rgb;
+
+    use super::*;
+
+    #[test]
+    fn images_are_compared_bit_by_bit() {
+        let mut image = Image::new(3, 2);
+        image.pixels.fill(Rgb::new(0.0, 1.0, 0.1));
+        assert!(same(&image, &image.clone()));
+        for (pixel, value) in [(0, Rgb::new(-0.0, 1.0, 0.1)), (5, Rgb::new(0.0, 1.0, 0.1_f32.next_up()))] {
+            let mut other = image.clone();
+            other.pixels[pixel] = value;
+            assert!(!same(&image, &other));
+        }
+        let other = Image { pixels: image.pixels.clone(), ..Image::new(2, 3) };
+        assert!(!same(&image, &other));
     }
 }

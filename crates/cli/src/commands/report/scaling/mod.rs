@@ -35,6 +35,8 @@ struct Settings {
     threads: Option<usize>,
     /// Queries to replay.
     queries: u64,
+    /// Along the longest side of the scene in the sweep of threads: enough work for several.
+    voxels_for_threads: u32,
 }
 
 impl Settings {
@@ -53,6 +55,7 @@ impl Settings {
             seed: args.seed,
             threads: args.threads,
             queries: if quick { 20_000 } else { 200_000 },
+            voxels_for_threads: either(512, 128),
         };
         let limits = [
             ("max-triangles", settings.max_triangles, triangles::LEAST, triangles::MOST),

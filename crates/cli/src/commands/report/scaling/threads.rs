@@ -1,7 +1,7 @@
 //! Time against the number of threads.
 
 use anyhow::anyhow;
-use vdf_render::{Method, default_voxel_size};
+use vdf_render::Method;
 
 use super::{
     measure::{Lab, Phase, method, pool},
@@ -44,7 +44,8 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
     );
     let scene = lab.builtin(SCENE)?;
     let ready = lab.ready(scene);
-    let size = default_voxel_size(ready.world.bounds);
+    let (min, max) = ready.world.bounds;
+    let size = (max - min).max_element() / f64::from(lab.settings.voxels_for_threads);
     let mut image = None;
     let mut proved = None;
     let methods = FIELDS.iter().map(|(_, from)| method(from)).collect::<Result<Vec<_>, Failure>>()?;
@@ -81,9 +82,10 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
         name: "threads",
         heading: "Threads",
         paragraphs: vec![format!(
-            "{SCENE}, {} triangles, a 128th of its longest side as the side of a voxel; images of {} × {} pixels, {} samples each. With threads that do not wait for \
+            "{SCENE}, {} triangles, its longest side {} voxels; images of {} × {} pixels, {} samples each. With threads that do not wait for \
              each other the exponent is -1 and the efficiency 1. All images were the same bit by bit, and amr-xsn proved the same number of queries.",
             ready.world.triangles.len(),
+            lab.settings.voxels_for_threads,
             lab.settings.size,
             lab.settings.size,
             lab.settings.spp

@@ -51,7 +51,11 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
             ("t_eff, amr-xsn", "amr-xsn"),
         ],
     );
-    let mut share = Group::new("p_acc|sp", Unit::Share, &[("amr", "amr"), ("amr-xsn", "amr-xsn")]);
+    let mut share = Group::new(
+        "Occupied voxels, and p_acc|sp",
+        Unit::Share,
+        &[("occupied", ""), ("amr", "amr"), ("amr-xsn", "amr-xsn")],
+    );
     let mut grid = String::new();
     for n in sizes(lab.settings.max_triangles) {
         lab.step("triangles", n);
@@ -74,6 +78,8 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
         let bytes = [Phase::Voxels, Phase::Field, Phase::Neighbourhoods].map(|p| builds.bytes(xsn, p));
         memory.push("amr-xsn, all", x, &[bytes.iter().flatten().sum()]);
 
+        share.push("occupied", x, &[builds.occupied_share()]);
+
         let replay = lab.replay(&ready, &replayed, size)?;
         let timing = |t: vdf_render::queries::Timing| [t.min, t.median, t.max];
         query.push("t_query, hierarchy", x, &timing(replay.hierarchy.t_spatial));
@@ -91,8 +97,7 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
         paragraphs: vec![
             format!(
                 "{SCENE} generated in several sizes, from {LEAST} triangles, the fewest of which the court can be made; in {grid} voxels \
-                 whatever its size. Finer shapes first, then more leaves: the scene of ten times the triangles occupies more voxels, so p_acc|sp is \
-                 not the same. xsn is the neighbourhood of its one point light."
+                 whatever its size. Shapes get finer and leaves more: neither the occupied voxels nor p_acc|sp are the same in all sizes. xsn is the neighbourhood of its one point light."
             ),
             "Fields know voxels only, not triangles: their times should not grow. The time of a query grows as the tree gets deeper and the caches get too small, \
              not as a power; its exponent says how slowly."

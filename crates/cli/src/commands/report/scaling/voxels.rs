@@ -76,7 +76,7 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
                  voxels, not against the side. sn and xsn are the neighbourhoods of the light, on top of the field.",
                 ready.world.triangles.len()
             ),
-            "Occupied voxels are a surface, so their share falls as voxels get smaller, and p_acc|sp rises. What grows in t_acc is the number of hops \
+            "Occupied voxels are a surface, so their share falls as voxels get smaller, and most of p_acc|sp rise. What grows in t_acc is the number of hops \
              and the share of the accesses that miss the caches; the hierarchy alone is the same at all sizes and shows the noise."
                 .to_owned(),
         ],
