@@ -37,6 +37,7 @@ fn close(name: &str, got: f64, expected: &Value, tolerance: f64) {
 }
 
 fn check(name: &str) {
+    let close = |metric: &str, got, expected, tolerance| close(&format!("{name}, {metric}"), got, expected, tolerance);
     let references = references();
     let pair = references["pairs"].as_array().unwrap().iter().find(|p| p["name"] == name).unwrap();
     let read = |role: &str| read_image(&folder().join(pair[role].as_str().unwrap())).unwrap();
@@ -56,7 +57,7 @@ fn check(name: &str) {
     let maps = read_exr(&folder().join(format!("{name}_maps.exr"))).unwrap();
     let same_map = |got: &[f32], expected: &[f32]| {
         let worst = got.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        println!("largest difference of a pixel: {worst:.1e}");
+        println!("{name}, largest difference of a pixel of the map: {worst:.1e}");
         assert!(worst <= PIXEL_TOLERANCE, "{worst}");
     };
     let (ldr, hdr): (Vec<f32>, Vec<f32>) = maps.pixels.iter().map(|p| (p.x, p.y)).unzip();

@@ -160,7 +160,7 @@ fn free_flights_are_drawn_with_the_transmittance() {
     }
 }
 
-/// A flight that is found short is the flight that [`Media::fly`] finds.
+/// A flight that is found short is the flight that [`Media::fly`] finds: it ends before a boundary and before the segment.
 #[test]
 fn short_flights_are_flights() {
     let scene = slabs();
@@ -171,7 +171,7 @@ fn short_flights_are_flights() {
         let mut u = Sampler::new(32, i, 0, 0);
         let p = dvec3(u.next_1d(), u.next_1d(), 1.0 + 2.0 * u.next_1d());
         let to = Phase::Isotropic.sample_direction(DVec3::Z, u.next_2d());
-        let segment = Segment::new(p, p + to * 100.0);
+        let segment = Segment::new(p, p + to * if i % 4 == 0 { 0.25 } else { 100.0 });
         let tau = -(-u.next_1d()).ln_1p();
         if let Some(flight) = media.short_flight(&segment, medium, tau) {
             found += 1;
@@ -182,7 +182,7 @@ fn short_flights_are_flights() {
             assert!(segment.at(t).distance(flight.q) < 1e-13, "{segment:?}: {} and {}", segment.at(t), flight.q);
         }
     }
-    assert!(found > 4000, "only {found} short flights");
+    assert!(found > 3000, "only {found} short flights");
 }
 
 /// Two points, two area emitters (of unequal, partly degenerate triangles that all face +Z) and a sky.

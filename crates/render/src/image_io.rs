@@ -8,7 +8,7 @@ use exr::meta::MetaData;
 use exr::prelude as openexr;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, WritableImage as _};
 
-use crate::atomic_file::write_atomically;
+use crate::atomic_file::StagedFile;
 use crate::{Image, Rgb, srgb};
 
 /// Longer names of attributes break other programs (Nuke).
@@ -108,9 +108,17 @@ impl From<AttributeValue> for openexr::AttributeValue {
 /// # Errors
 /// The file cannot be written, or an attribute's name is empty, repeated, longer than 31 bytes or not ASCII.
 pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue)]) -> Result<(), ImageError> {
+    persist(path, stage_exr(path, image, attributes)?)
+}
+
+/// As [`write_exr`], but the file does not appear before [`StagedFile::persist`].
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn stage_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue)]) -> Result<StagedFile, ImageError> {
     let bytes =
         encode_exr(image, attributes).map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
-    write_bytes(path, &bytes)
+    stage_bytes(path, &bytes)
 }
 
 /// Writes an 8-bit PNG with the sRGB transfer curve. Values outside [0, 1] are clamped, NaN becomes black.
@@ -118,8 +126,16 @@ pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue
 /// # Errors
 /// The file cannot be written, or the image has no pixels.
 pub fn write_png(path: &Path, image: &Image) -> Result<(), ImageError> {
+    persist(path, stage_png(path, image)?)
+}
+
+/// As [`write_png`], but the file does not appear before [`StagedFile::persist`].
+///
+/// # Errors
+/// As [`write_png`].
+pub fn stage_png(path: &Path, image: &Image) -> Result<StagedFile, ImageError> {
     let bytes = encode_png(image).map_err(|reason| ImageError::Unencodable { path: path.to_owned(), reason })?;
-    write_bytes(path, &bytes)
+    stage_bytes(path, &bytes)
 }
 
 /// The bytes that [`write_png`] writes.
@@ -135,7 +151,7 @@ pub fn encode_png(image: &Image) -> Result<Vec<u8>, String> {
 /// Writes an 8-bit PNG of red, green and blue, as a display takes them.
 pub(crate) fn write_png_bytes(path: &Path, width: u32, height: u32, samples: &[u8]) -> Result<(), ImageError> {
     let unencodable = |reason: String| ImageError::Unencodable { path: path.to_owned(), reason };
-    write_bytes(path, &encode_png_bytes(width, height, samples).map_err(unencodable)?)
+    persist(path, stage_bytes(path, &encode_png_bytes(width, height, samples).map_err(unencodable)?)?)
 }
 
 fn encode_png_bytes(width: u32, height: u32, samples: &[u8]) -> Result<Vec<u8>, String> {
@@ -255,9 +271,13 @@ fn decode_png(file: BufReader<File>) -> Result<Image, String> {
     Ok(image)
 }
 
-fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    write_atomically(path, |out| out.write_all(bytes))
+fn stage_bytes(path: &Path, bytes: &[u8]) -> Result<StagedFile, ImageError> {
+    StagedFile::write(path, |out| out.write_all(bytes))
         .map_err(|source| ImageError::Write { path: path.to_owned(), source })
+}
+
+fn persist(path: &Path, file: StagedFile) -> Result<(), ImageError> {
+    file.persist().map_err(|source| ImageError::Write { path: path.to_owned(), source })
 }
 
 /// Refuses what the decoder would choke on, before it takes memory for it.

@@ -35,10 +35,13 @@ mod world;
 
 pub use acceleration::{Acceleration, BuildReport, FieldAcceleration, LightShape, ProofsVisitor};
 pub use area_light::AreaNeighbourhood;
-pub use atomic_file::{check_writable, write_atomically};
+pub use atomic_file::{PersistError, StagedFile, check_writable, write_atomically};
 pub use error::RenderError;
 pub use image::Image;
-pub use image_io::{AttributeValue, ImageError, ImageFormat, encode_png, read_exr, read_image, write_exr, write_png};
+pub use image_io::{
+    AttributeValue, ImageError, ImageFormat, encode_png, read_exr, read_image, stage_exr, stage_png, write_exr,
+    write_png,
+};
 pub use lights::{LightSample, Lights};
 pub use media::{Flight, Media, Way};
 pub use mesh::Triangle;

@@ -281,3 +281,58 @@ impl<'a, P: Proofs, R: Recorder> Visibility<'a, P, R> {
         !self.bvh.occluded(&Segment::new(query.from, query.to))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, dvec3};
+
+    use super::*;
+    use crate::Triangle;
+
+    /// Claims that nothing is occluded; who believes it can be told by a wrong answer.
+    struct Liar {
+        between: bool,
+        on_light: bool,
+    }
+
+    impl Proofs for Liar {
+        fn answer(&self, _: usize, a: DVec3, b: DVec3) -> Answer {
+            self.answer_between(a, b)
+        }
+
+        fn answer_between(&self, _: DVec3, _: DVec3) -> Answer {
+            if self.between { Answer::Unoccluded } else { Answer::Unknown }
+        }
+
+        fn answer_on_light(&self, _: usize, _: DVec3, _: DVec3) -> Answer {
+            if self.on_light { Answer::Unoccluded } else { Answer::Unknown }
+        }
+    }
+
+    /// Which proofs a question may use: of queries by their kind, of free flights only from a point in space, and if asked for.
+    #[test]
+    fn each_question_uses_its_own_proofs() {
+        let bvh = Bvh::new(&[Triangle::new(Vec3::ZERO, Vec3::X, Vec3::Y)]);
+        let (from, to) = (dvec3(0.25, 0.25, -1.0), dvec3(0.25, 0.25, 1.0));
+        for (between, on_light) in [(false, false), (true, false), (false, true), (true, true)] {
+            let liar = Liar { between, on_light };
+            let visibility = Visibility::new(&bvh, &liar, true);
+            for (kind, believed) in
+                [(QueryKind::Spatial, between), (QueryKind::OnLight, on_light), (QueryKind::Superficial, false)]
+            {
+                let mut counters = Counters::default();
+                let query = ShadowQuery { from, to, emitter: 0, kind };
+                assert_eq!(visibility.unoccluded(&query, &mut counters), believed, "{kind:?}");
+                assert_eq!(counters.proved + counters.on_light_proved, u64::from(believed), "{kind:?}");
+                assert_eq!(counters.spatial, u64::from(kind == QueryKind::Spatial), "{kind:?}");
+            }
+            for (segment_first, spatial) in [(false, false), (true, false), (false, true), (true, true)] {
+                let mut counters = Counters::default();
+                let visibility = Visibility::new(&bvh, &liar, segment_first);
+                let hit = visibility.intersect_flight(&Segment::new(from, to), spatial, &mut counters);
+                assert_eq!(hit.is_none(), between && segment_first && spatial, "{segment_first} {spatial}");
+                assert_eq!(counters.flights, u64::from(segment_first && spatial));
+            }
+        }
+    }
+}

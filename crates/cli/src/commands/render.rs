@@ -8,12 +8,12 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
 use vdf_render::{
-    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, Statistics, TransmittanceEstimator, World,
-    check_writable,
+    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, StagedFile, Statistics,
+    TransmittanceEstimator, World, check_writable,
     queries::{QueryStream, record_queries},
     render,
     scene::{DEFAULT_SCENE, LoadOptions, Scene, builtin, builtin_names},
-    write_atomically, write_exr, write_png,
+    stage_exr, stage_png,
 };
 
 use crate::{
@@ -49,7 +49,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
         write_stream(path, stream)?;
     }
-    write_all(&rendering, &output, args, &name)?;
+    let attributes = attributes(&rendering.statistics, &name, &scene);
+    write_all(&rendering, &output, args, &attributes)?;
     let stdout = &mut std::io::stdout();
     if !args.quiet {
         writeln!(stdout, "{}", rendering.statistics)?;
@@ -156,34 +157,44 @@ fn is_same(a: &Path, b: &Path) -> bool {
     absolute(a) == absolute(b)
 }
 
-/// Writes the statistics, the PNG and last the EXR, so that who waits for the EXR finds all three.
-fn write_all(rendering: &Rendering, output: &Output, args: &RenderArgs, name: &str) -> Result<(), Failure> {
-    let statistics = &rendering.statistics;
+/// Writes the statistics, the PNG and the EXR, and only when all are written moves them to their places, the EXR last: who waits for
+/// it finds all three, and a failure leaves none.
+fn write_all(
+    rendering: &Rendering,
+    output: &Output,
+    args: &RenderArgs,
+    attributes: &[(&str, AttributeValue)],
+) -> Result<(), Failure> {
+    let mut files = Vec::new();
     if let Some(path) = &args.stats {
-        write_json(path, statistics)?;
+        files.push(stage_json(path, &rendering.statistics)?);
     }
-    write_png(&output.png, &rendering.image).map_err(RenderError::from)?;
-    let attributes = attributes(statistics, name);
-    let attributes: Vec<_> = attributes.iter().map(|(n, v)| (*n, v.clone())).collect();
-    write_exr(&output.exr, &rendering.image, &attributes).map_err(RenderError::from)?;
-    Ok(())
+    files.push(stage_png(&output.png, &rendering.image).map_err(RenderError::from)?);
+    files.push(stage_exr(&output.exr, &rendering.image, attributes).map_err(RenderError::from)?);
+    StagedFile::persist_all(files).map_err(|error| Failure::Work(error.into()))
 }
 
 /// Writes the figures of a run for machines.
 pub(super) fn write_json(path: &Path, figures: &impl Serialize) -> Result<(), Failure> {
+    let file = stage_json(path, figures)?;
+    file.persist().with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)
+}
+
+fn stage_json(path: &Path, figures: &impl Serialize) -> Result<StagedFile, Failure> {
     let json =
         serde_json::to_string_pretty(figures).context("cannot express the figures as JSON").map_err(Failure::Work)?;
-    write_atomically(path, |w| writeln!(w, "{json}"))
+    StagedFile::write(path, |w| writeln!(w, "{json}"))
         .with_context(|| format!("cannot write {}", path.display()))
         .map_err(Failure::Work)
 }
 
 /// What the EXR says of its making.
-fn attributes(s: &Statistics, name: &str) -> Vec<(&'static str, AttributeValue)> {
+fn attributes(s: &Statistics, name: &str, scene: &Scene) -> Vec<(&'static str, AttributeValue)> {
     let count = |n: u64| AttributeValue::from(n as f64);
     let mut attributes = vec![
         ("vdf.version", s.version.into()),
         ("vdf.scene", name.into()),
+        ("vdf.sceneHash", format!("{:08x}", scene.checksum()).into()),
         ("vdf.method", s.method.into()),
         ("vdf.integrator", s.integrator.into()),
         ("vdf.transmittance", s.transmittance.into()),

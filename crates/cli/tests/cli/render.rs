@@ -33,6 +33,26 @@ fn writes_image_and_statistics() {
     assert!(proved > 0.1, "{proved}");
 }
 
+/// The image says which scene it shows: by its content, not by its name, nor by how it was rendered.
+#[test]
+fn an_exr_has_the_checksum_of_its_scene() {
+    let sandbox = Sandbox::new();
+    sandbox.run(&["scene", "write", "cbox_vol2", "room"]).succeeded();
+    let hash = |args: &[&str]| {
+        sandbox.render(&[args, &["-o", "a.exr"]].concat());
+        let exr = sandbox.read("a.exr");
+        // The name and the type end with a zero; the length has four bytes.
+        let key = b"vdf.sceneHash\0string\0\x08\0\0\0";
+        let at = exr.windows(key.len()).position(|w| w == key).unwrap() + key.len();
+        String::from_utf8(exr[at..at + 8].to_vec()).unwrap()
+    };
+    let first = hash(&[]);
+    assert!(first.bytes().all(|b| b.is_ascii_hexdigit()), "{first}");
+    assert_eq!(hash(&["room/cbox_vol2.xml", "--method", "none", "--seed", "7"]), first);
+    assert_ne!(hash(&["cbox_vol3"]), first);
+    assert_ne!(hash(&["-D", "max_depth=3"]), first);
+}
+
 #[test]
 fn statistics_of_the_plain_method() {
     let sandbox = Sandbox::new();

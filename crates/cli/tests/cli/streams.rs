@@ -84,6 +84,19 @@ fn statistics_to_a_full_device() {
     Sandbox::new().fails(&args, 1, &["cannot write /dev/full: No space left on device"]);
 }
 
+/// A failed write leaves nothing: neither the images that were written before it nor the statistics.
+#[cfg(target_os = "linux")]
+#[test]
+fn images_appear_together_or_not_at_all() {
+    for full in ["a.exr", "a.png"] {
+        let sandbox = Sandbox::new();
+        std::os::unix::fs::symlink("/dev/full", sandbox.path().join(full)).unwrap();
+        let args = [&["render", "-o", "a.exr", "--stats", "a.json"], &TINY[..]].concat();
+        sandbox.fails(&args, 1, &[&format!("cannot write {full}: No space left on device")]);
+        assert_eq!(sandbox.files(), [full]);
+    }
+}
+
 /// The commands that write to stdout.
 fn talkers() -> [(Sandbox, Vec<&'static str>); 7] {
     let compare = Sandbox::new();

@@ -1,6 +1,7 @@
 //! The scene model: what a scene file describes, resolved, checked and ready to render.
 
 mod builtin;
+mod checksum;
 mod generate;
 mod load;
 mod model;
