@@ -56,9 +56,11 @@ impl Reference {
         Ok(Self { setting, spp, image, floor, flip, cached })
     }
 
-    /// Whether an error of this relMSE, with the floor, can be told from the reference's own.
-    pub(super) fn claims(&self, rel_mse: f64) -> bool {
-        rel_mse > 0.0 && rel_mse.is_finite() && rel_mse >= CLAIM * self.floor.rel_mse_bound
+    /// Whether these errors, with the floor, can be told from the reference's own. Both have to: a reference with much noise
+    /// is dark in pixels by chance, and its divisors make any relMSE large; MSE has none.
+    pub(super) fn claims(&self, rel_mse: f64, mse: f64) -> bool {
+        let above = |error: f64, bound: f64| error > 0.0 && error.is_finite() && error >= CLAIM * bound;
+        above(rel_mse, self.floor.rel_mse_bound) && above(mse, self.floor.mse_bound)
     }
 }
 
@@ -158,10 +160,17 @@ mod tests {
         // Halves that agree claim everything but nothing.
         let exact = Reference::new(Setting::Volpath, 2, &[a.clone(), a.clone()], false).unwrap();
         assert_eq!((exact.floor.mse, exact.floor.rel_mse_bound, exact.flip), (0.0, 0.0, 0.0));
-        assert!(exact.claims(1e-30) && !exact.claims(0.0) && !exact.claims(f64::NAN) && !exact.claims(f64::INFINITY));
+        assert!(
+            exact.claims(1e-30, 1e-30)
+                && !exact.claims(0.0, 1.0)
+                && !exact.claims(f64::NAN, 1.0)
+                && !exact.claims(f64::INFINITY, 1.0)
+        );
         let noisy = Reference::new(Setting::Volpath, 2, &[a, b], false).unwrap();
-        let least = CLAIM * noisy.floor.rel_mse_bound;
-        assert!(noisy.claims(least) && !noisy.claims(0.999 * least));
+        let (least, of_mse) = (CLAIM * noisy.floor.rel_mse_bound, CLAIM * noisy.floor.mse_bound);
+        assert!(
+            noisy.claims(least, of_mse) && !noisy.claims(0.999 * least, of_mse) && !noisy.claims(least, 0.999 * of_mse)
+        );
         // Black is no division by zero.
         let black = Image::new(3, 2);
         assert_eq!(Reference::new(Setting::Volpath, 2, &[black.clone(), black], false).unwrap().floor.rel_mse, 0.0);

@@ -71,7 +71,8 @@ impl<'a> Tables<'a> {
 
     /// Whether the errors of so many samples can be told from the reference's own.
     pub(super) fn is_claimed(&self, s: &SettingResult, spp: usize) -> bool {
-        self.reference(s).claims(self.as_measured(s, spp, |e| e.rel_mse).median)
+        let median = |error| self.as_measured(s, spp, error).median;
+        self.reference(s).claims(median(|e| e.rel_mse), median(|e| e.mse))
     }
 
     /// The places in the plan of all samples whose errors are claimed.
@@ -204,7 +205,7 @@ impl<'a> Tables<'a> {
                 format!(
                     "A reference is the mean of two halves with seeds that no other render has, by the hierarchy alone. A quarter of their squared \
                      difference has the mean of the reference's own variance, which every error measured contains: it is subtracted from MSE and \
-                     relMSE. \"At most\" is two standard errors more. A relMSE is claimed if it is, as measured, {CLAIM} times that; others are neither \
+                     relMSE. \"At most\" is two standard errors more. An error is claimed if its relMSE and its MSE are, as measured, {CLAIM} times that; others are neither \
                      plotted nor used. FLIP cannot be corrected so: where it is in proportion to the standard deviation, the reference's noise \
                      raises it by 15 % at most in what is claimed."
                 ),
