@@ -60,6 +60,8 @@ fn a_box_is_shut_if_nothing_is_missing() {
                 }),
                 "one missing"
             );
+            let but_one: Vec<_> = inwards.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, t)| *t).collect();
+            assert!(!is_shut(&but_one), "inwards, one missing");
             assert!(!changed(&|t| t[i].vertices.swap(0, 1)), "one turned over");
             assert!(!changed(&|t| t[i] = whole[(i + 1) % 12]), "one twice");
             assert!(!changed(&|t| t[i] = whole[(i + 6) % 12]), "a face without and one with too much");
@@ -146,6 +148,19 @@ fn a_box_and_its_triangles_say_the_same() {
         }
     }
     assert!(left > 2000 && short > 2000 && gone > 2000, "{left} left the box, {short} did not, {gone} for good");
+}
+
+/// Fog leaks through the gap of an open box.
+#[test]
+fn an_open_box_is_not_left_through_its_gap() {
+    let mut shape = cuboid(Vec3::ZERO, Vec3::ONE, 0);
+    shape.retain(|t| t.vertices.iter().any(|v| v.z == 0.0));
+    assert!(Bounds::of(&shape).hollow && shape.len() == 10);
+    let open = media(shape, 1.0);
+    let through_the_gap = Segment::new(dvec3(0.5, 0.5, 0.5), dvec3(0.5, 0.5, 3.0));
+    assert!(open.short_flight(&through_the_gap, FOG, 2.0).is_some());
+    let through_a_wall = Segment::new(dvec3(0.5, 0.5, 0.5), dvec3(3.0, 0.5, 0.5));
+    assert!(open.short_flight(&through_a_wall, FOG, 2.0).is_none());
 }
 
 /// A box in a larger medium, and two boxes: whoever leaves one is not gone for good.
