@@ -202,15 +202,21 @@ fn long_corridors_saturate() {
             c
         };
         let [x, y, z] = along(700, 2);
-        let [i, j, k] = along(600, 1);
-        let occupied = set(Resolution::new(x, y, z), [Voxel::new(i, j, k)]);
-        let definitions = Definitions::new(&occupied);
-        definitions.check_values();
+        let occupied_at = |n| {
+            let [i, j, k] = along(n, 1);
+            set(Resolution::new(x, y, z), [Voxel::new(i, j, k)])
+        };
         let at = |n| {
             let [i, j, k] = along(n, 0);
             Voxel::new(i, j, k)
         };
-        definitions.check_proofs(&[at(0), at(340), at(345), at(346), at(600), at(699)]);
+        // From there distances rise, and fall, to more than a byte holds.
+        for (n, ends) in [(600, [0, 340, 345, 346, 600, 699]), (99, [0, 99, 353, 354, 359, 699])] {
+            let definitions = Definitions::new(&occupied_at(n));
+            definitions.check_values();
+            definitions.check_proofs(&ends.map(at));
+        }
+        let occupied = occupied_at(600);
         // What is proved at most from a voxel without anything near: one less than the saturated distance.
         let farthest = [254, 254, 255, 254 + 255];
         for ((name, field), farthest) in fields(&occupied).into_iter().zip(farthest) {
