@@ -105,8 +105,8 @@ Answers of proofs are compared with the hierarchy's, images bit by bit between m
 
 Examples:
   vdf report scaling --quick                                         a look
-  vdf report scaling --html scaling.html --csv scaling.csv           about three minutes on two cores
-  vdf report scaling --only triangles --max-triangles 1e7            8 GiB of memory
+  vdf report scaling --html scaling.html --csv scaling.csv           a minute and a half on two cores
+  vdf report scaling --only triangles --max-triangles 1e7            takes gigabytes of memory
   vdf report scaling --only voxels --max-voxels-per-side 512 --repetitions 3
 
 Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2 usage error, 130 interrupted."
@@ -154,7 +154,7 @@ pub(crate) struct ReportScalingArgs {
 predicts and the gain measured. Images are compared bit by bit between all methods. The times of renders are
 for one thread, as in the thesis, and scaled to its images of 512 x 512 pixels if these are smaller.
 
-At full size this takes most of a day; --size 128 a sixteenth of that, --quick two minutes.
+At full size this takes most of a day; --size 128 a sixteenth of that, --quick a minute.
 
 Examples:
   vdf report thesis --quick                                     a look
