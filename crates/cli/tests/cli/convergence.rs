@@ -104,7 +104,10 @@ fn speed_against_error_in_miniature() {
         assert!(value("T_build", "amr-xsn") > 0.0 && value("efficiency", "amr-xsn") > 0.0);
     }
     let csv = String::from_utf8(sandbox.read("c.csv")).unwrap();
-    assert!(csv.contains("\ntable,scene,integrator,method,voxel_size,spp,seed,against,quantity,unit,value,thesis\n"), "{csv}");
+    assert!(
+        csv.contains("\ntable,scene,integrator,method,voxel_size,spp,seed,against,quantity,unit,value,thesis\n"),
+        "{csv}"
+    );
     assert_eq!(csv.lines().filter(|l| !l.starts_with('#')).count(), 1 + figures.0.len());
 
     // The second run takes the same references from the folder and finds the same errors, whatever the number of threads.
