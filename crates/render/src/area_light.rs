@@ -40,8 +40,6 @@ pub struct AreaNeighbourhood {
     light: VoxelBox,
     far: ExtendedNeighbourhood,
     near: Bvh,
-    /// Bounds of the near triangles.
-    bounds: (DVec3, DVec3),
 }
 
 impl AreaNeighbourhood {
@@ -68,12 +66,7 @@ impl AreaNeighbourhood {
             return Ok(None);
         }
         let far = triangles.par_iter().filter(|t| !is_near(t)).map(|t| t.vertices);
-        Ok(Some(Self {
-            light,
-            far: ExtendedNeighbourhood::new(&voxelize(grid, far)?, light),
-            bounds: bounds(near.iter()),
-            near: Bvh::new(&near),
-        }))
+        Ok(Some(Self { light, far: ExtendedNeighbourhood::new(&voxelize(grid, far)?, light), near: Bvh::new(&near) }))
     }
 
     /// True if no occluder meets the closed segment `from`–`to`. False says nothing.
@@ -81,18 +74,7 @@ impl AreaNeighbourhood {
     #[must_use]
     pub fn proves(&self, grid: &VoxelGrid, from: DVec3, to: DVec3) -> bool {
         let (Some(a), Some(b)) = (grid.voxel_containing(from), grid.voxel_containing(to)) else { return false };
-        self.far.proves(a) && self.light.contains(b) && (self.is_beside(from, to) || !self.meets_near(from, to))
-    }
-
-    /// True if the bounds of the segment and of the near occluders are disjoint.
-    #[inline]
-    fn is_beside(&self, from: DVec3, to: DVec3) -> bool {
-        let (min, max) = self.bounds;
-        from.max(to).cmplt(min).any() || from.min(to).cmpgt(max).any()
-    }
-
-    fn meets_near(&self, from: DVec3, to: DVec3) -> bool {
-        self.near.occluded(&Segment::new(from, to))
+        self.far.proves(a) && self.light.contains(b) && !self.near.occluded(&Segment::new(from, to))
     }
 
     /// The number of voxels from which the light's box is free of far occluders.
