@@ -5,16 +5,17 @@
 //! is asked of the pixels: a few are rendered again and must have the same bits (`measure.rs`).
 
 use std::{
-    fmt::{self, Write as _},
-    fs,
-    hash::{DefaultHasher, Hasher},
-    io,
+    fs, io,
     path::{Path, PathBuf},
 };
 
 use anyhow::Context as _;
 use serde::{Deserialize, Serialize};
-use vdf_render::{Image, RenderError, check_writable, read_exr, scene::Scene, write_atomically, write_exr};
+use vdf_render::{
+    Image, RenderError, check_writable, read_exr,
+    scene::{PixelRect, Scene},
+    write_atomically, write_exr,
+};
 
 use super::{measure::Setting, reference::SEEDS};
 use crate::failure::Failure;
@@ -29,10 +30,10 @@ pub(super) struct Cache {
 pub(super) struct Key {
     /// The scene's name.
     scene: String,
-    /// A hash of all that is in the scene. Another compiler may hash otherwise; then it is rendered again.
-    contents: String,
-    /// Width and height.
-    size: [u32; 2],
+    /// [`Scene::checksum`], in which the crop is not.
+    checksum: u32,
+    /// The pixels: x0, y0, x1 and y1.
+    crop: [u32; 4],
     integrator: String,
     /// Samples per pixel of each half.
     spp: u32,
@@ -61,11 +62,11 @@ pub(super) enum Lookup {
 
 impl Key {
     pub(super) fn new(name: &str, scene: &Scene, setting: Setting, spp: u32) -> Self {
-        let film = &scene.film;
+        let PixelRect { x0, y0, x1, y1 } = scene.film.crop;
         Self {
             scene: name.to_owned(),
-            contents: contents(scene),
-            size: [film.crop.x1 - film.crop.x0, film.crop.y1 - film.crop.y0],
+            checksum: scene.checksum(),
+            crop: [x0, y0, x1, y1],
             integrator: setting.to_string(),
             spp,
             seeds: SEEDS,
@@ -76,36 +77,10 @@ impl Key {
     fn stem(&self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
         let scene: String = self.scene.chars().map(plain).take(40).collect();
-        let ([width, height], spp) = (self.size, 2 * u64::from(self.spp));
-        format!("{scene}-{}-{width}x{height}-{spp}-{}", self.integrator.replace(' ', ""), self.contents)
+        let ([x0, y0, x1, y1], spp) = (self.crop, 2 * u64::from(self.spp));
+        let integrator = self.integrator.replace(' ', "");
+        format!("{scene}-{integrator}-{}x{}+{x0}+{y0}-{spp}-{:08x}", x1 - x0, y1 - y0, self.checksum)
     }
-}
-
-/// A hash of the scene but for its samples and its seed, which a reference does not take from it.
-fn contents(scene: &Scene) -> String {
-    struct Sink(DefaultHasher);
-    impl fmt::Write for Sink {
-        fn write_str(&mut self, text: &str) -> fmt::Result {
-            self.0.write(text.as_bytes());
-            Ok(())
-        }
-    }
-    let Scene {
-        surfaces,
-        boundaries,
-        media,
-        emitters,
-        sensor,
-        film,
-        integrator,
-        sample_count: _,
-        seed: _,
-        warnings: _,
-    } = scene;
-    let mut sink = Sink(DefaultHasher::new());
-    // Debug shows every field, and of every number all digits. A hash cannot fail.
-    let _ = write!(sink, "{:?}", (surfaces, boundaries, media, emitters, sensor, film, integrator));
-    format!("{:016x}", sink.0.finish())
 }
 
 impl Cache {
@@ -184,7 +159,8 @@ fn read_half(path: &Path, key: &Key, crc32: u32) -> Result<Image, String> {
         return Err("it is damaged".to_owned());
     }
     let image = read_exr(path).map_err(|e| e.to_string())?;
-    let sound = [image.width, image.height] == key.size && image.pixels.iter().all(|p| p.is_finite());
+    let [x0, y0, x1, y1] = key.crop;
+    let sound = [image.width, image.height] == [x1 - x0, y1 - y0] && image.pixels.iter().all(|p| p.is_finite());
     if sound { Ok(image) } else { Err("it has another size, or pixels that are not finite".to_owned()) }
 }
 
@@ -215,7 +191,7 @@ mod tests {
         let small = [("width", "8"), ("height", "8")];
         let key = |scene: &Scene, setting, spp| Key::new("a/b <c>", scene, setting, spp);
         let first = key(&scene(&small), Setting::Volpath, 4);
-        assert!(first.stem().starts_with("a-b--c--volpath-8x8-8-"), "{}", first.stem());
+        assert!(first.stem().starts_with("a-b--c--volpath-8x8+0+0-8-"), "{}", first.stem());
         // The scene's own samples and seed are not used.
         assert_eq!(first, key(&scene(&[small[0], small[1], ("spp", "7"), ("seed", "9")]), Setting::Volpath, 4));
         let mut moved = scene(&small);
