@@ -152,7 +152,7 @@ pub(crate) struct ReportScalingArgs {
 #[command(
     after_help = "Tables 6.1, 6.2, 6.4 to 6.11 and Figure 6.7, for all methods, and the inequality 2.7: the gain that it
 predicts and the gain measured. Images are compared bit by bit between all methods. The times of renders are
-for one thread, as in the thesis, and scaled to its images of 512 x 512 pixels if these are smaller.
+for one thread, as in the thesis, and for all, and scaled to its images of 512 x 512 pixels if these are smaller.
 
 At full size this takes most of a day; --size 128 a sixteenth of that, --quick a minute.
 
@@ -180,6 +180,9 @@ pub(crate) struct ReportThesisArgs {
     /// Seed of the renders
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) seed: u64,
+    /// Number of all threads, whose renders stand beside those on one thread [default: one for each processor]
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
     #[command(flatten)]
     pub(crate) files: ReportFiles,
 }

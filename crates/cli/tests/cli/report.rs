@@ -130,7 +130,7 @@ fn the_thesis_in_miniature() {
     let sandbox = Sandbox::new();
     let args =
         ["report", "thesis", "--quick", "--size", "4", "--scenes", "cbox_vol2,cbox_vol6", "--methods", "amr-sn,ndf"];
-    let files = ["--html", "t.html", "--csv", "t.csv", "--json", "t.json", "-q"];
+    let files = ["--html", "t.html", "--csv", "t.csv", "--json", "t.json", "-q", "--threads", "3"];
     let text = sandbox.run(&[&args[..], &files].concat()).succeeded().stdout;
     for heading in
         ["Table 6.1:", "Table 6.2:", "Table 6.4", "Tables 6.5 to 6.10: cbox_vol6", "Table 6.11", "Inequality 2.7"]
@@ -151,8 +151,10 @@ fn the_thesis_in_miniature() {
     let count = |table: &str| figures.iter().filter(|f| f["table"] == table).count();
     assert_eq!(count("6.11"), 8);
     assert_eq!(count("6.4"), 1 + 2 * 3);
-    assert_eq!(count("6.5-6.10"), 4 * (3 + 2 * 4));
-    assert_eq!(count("2.7"), 4 * 2 * 4);
+    // Times of renders and of builds on three threads too.
+    assert_eq!(count("6.5-6.10"), 4 * (3 + 1 + 2 * (4 + 2)));
+    assert_eq!(count("2.7"), 4 * 2 * (4 + 1));
+    assert_eq!(figures.iter().filter(|f| f["against"] == 3.0).count(), 4 * (1 + 2 * 3));
     assert_eq!((count("6.1"), count("6.2")), (3, 7));
     assert!(figures.iter().all(|f| f["value"].is_f64()), "a figure is not finite");
 }
@@ -214,6 +216,7 @@ fn failures() {
     sandbox.fails(&["report", "queries", "--queries", "a", "--spp", "1"], 2, &["cannot be used with"]);
     sandbox.fails(&["report", "thesis", "--scenes", "moon"], 2, &["moon", "san-miguel"]);
     sandbox.fails(&["report", "thesis", "--size", "0"], 2, &["--size must be from 1 to 4096, not 0"]);
+    sandbox.fails(&["report", "thesis", "--threads", "0"], 2, &["--threads must be from 1 to 1024, not 0"]);
     sandbox.fails(&["report", "scaling", "--only", "stars"], 2, &["stars", "triangles"]);
     for (option, value, must) in [
         ("max-triangles", "99999", "from 100000 to 10000000, not 99999"),

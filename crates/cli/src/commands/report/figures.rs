@@ -69,6 +69,11 @@ impl Figure {
         Self { spp: Some(spp), ..self }
     }
 
+    /// Of a measurement with so many triangles, voxels, lights or threads.
+    pub(super) fn against(self, x: f64) -> Self {
+        Self { against: Some(x), ..self }
+    }
+
     /// Of the render with this seed.
     pub(super) fn of_seed(self, seed: u64) -> Self {
         Self { seed: Some(seed), ..self }

@@ -26,6 +26,8 @@ pub(super) struct Bench<'a> {
     pub(super) side: u32,
     pub(super) quick: bool,
     pub(super) seed: u64,
+    /// Threads of the renders beside those on one thread; 1 if there are none.
+    pub(super) threads: usize,
 }
 
 /// A scene of Tables 6.4 to 6.11.
@@ -44,6 +46,8 @@ pub(super) struct SettingResult {
     /// `T_render` and `T_query` of the hierarchy alone in seconds, scaled.
     pub(super) t_render: f64,
     pub(super) t_query: f64,
+    /// On all threads.
+    pub(super) threaded: Option<Threaded>,
     pub(super) replay: Replay,
     pub(super) methods: Vec<MethodResult>,
 }
@@ -57,8 +61,17 @@ pub(super) struct MethodResult {
     pub(super) t_render: f64,
     /// Scaled.
     pub(super) t_query: f64,
+    /// On all threads.
+    pub(super) threaded: Option<Threaded>,
     /// Of the render, all of whose queries count; the replay has some of them.
     pub(super) p_acc_sp: f64,
+}
+
+/// `T_build` and `T_render` (with it) on all threads, where they are more than one. In seconds, scaled as on one thread.
+#[derive(Clone, Copy)]
+pub(super) struct Threaded {
+    pub(super) t_build: f64,
+    pub(super) t_render: f64,
 }
 
 /// A setting of Table 6.1 and its runs: `T_build`, `T_render`, `T_query`.
@@ -83,6 +96,12 @@ pub(super) struct MeasuredResult<'a> {
 struct Ready {
     scene: Scene,
     world: World,
+}
+
+/// What was built on one thread and on all, the same but for the time it took.
+struct Structures<'a> {
+    one: &'a (Acceleration, BuildReport),
+    all: &'a (Acceleration, BuildReport),
 }
 
 /// Renders that alternate for Table 6.2.
@@ -147,8 +166,8 @@ impl Bench<'_> {
     }
 
     fn build(&self, ready: &Ready, options: &RenderOptions) -> Result<(Acceleration, BuildReport), Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        let pool = pool.context("cannot start a thread").map_err(Failure::Work)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
+        let pool = pool.context("cannot start threads").map_err(Failure::Work)?;
         let size = options.voxel_size.unwrap_or(1.0);
         let Ready { scene, world } = ready;
         let build = || {
@@ -219,7 +238,9 @@ impl Bench<'_> {
             let replay = self.replay(&ready, &stream, self.methods, &sizes, 5)?;
             self.done();
             self.step(scene.name, "none");
-            let (image, s) = self.render(&ready, &self.build(&ready, &options)?, &options)?;
+            let built = self.build(&ready, &options)?;
+            let (image, s) = self.render(&ready, &built, &options)?;
+            let threaded = self.threaded(&ready, &built, &options, &image)?;
             self.done();
             let (n, p_sp) = (self.scale() * s.queries as f64, s.p_spatial.unwrap_or(0.0));
             settings.push(SettingResult {
@@ -228,6 +249,7 @@ impl Bench<'_> {
                 p_sp,
                 t_render: self.scale() * s.t_render,
                 t_query: total(n, p_sp, &replay, replay.hierarchy.t_spatial.median),
+                threaded,
                 replay,
                 methods: vec![],
             });
@@ -236,7 +258,10 @@ impl Bench<'_> {
         for &size in &sizes {
             for &method in self.methods {
                 self.step(scene.name, &format!("{method} {size}"));
-                let built = self.build(&ready, &self.options(method, size, None, SPP))?;
+                let options = self.options(method, size, None, SPP);
+                let built = self.build(&ready, &options)?;
+                let on_all = self.on_all_threads(&options).map(|o| self.build(&ready, &o)).transpose()?;
+                let built = Structures { one: &built, all: on_all.as_ref().unwrap_or(&built) };
                 for (setting, image) in settings.iter_mut().zip(&images) {
                     let result = self.method(&ready, &built, method, size, setting, image)?;
                     setting.methods.push(result);
@@ -251,33 +276,43 @@ impl Bench<'_> {
     fn method(
         &self,
         ready: &Ready,
-        built: &(Acceleration, BuildReport),
+        built: &Structures<'_>,
         method: Method,
         size: f64,
         setting: &SettingResult,
         expected: &Image,
     ) -> Result<MethodResult, Failure> {
-        let (image, s) = self.render(ready, built, &self.options(method, size, setting.samples, SPP))?;
-        let same = image
-            .pixels
-            .iter()
-            .zip(&expected.pixels)
-            .all(|(a, b)| a.to_array().map(f32::to_bits) == b.to_array().map(f32::to_bits));
-        if !same {
-            let (name, integrator) = (method.name(), integrator_name(setting.samples));
-            return Err(Failure::Work(anyhow!(
-                "WRONG IMAGE: {integrator} with {name} and voxel {size} differs from none"
-            )));
-        }
+        let options = self.options(method, size, setting.samples, SPP);
+        let (image, s) = self.render(ready, built.one, &options)?;
+        same(&image, expected, &options)?;
         let found = setting.replay.methods.iter().find(|m| m.method == method.name() && m.voxel_size == size);
         let replay = found.cloned().ok_or_else(|| Failure::Work(anyhow!("{method} was not replayed")))?;
         Ok(MethodResult {
             t_build: s.t_build,
             t_render: self.scale() * s.t_render + s.t_build,
             t_query: total(setting.n, setting.p_sp, &setting.replay, replay.t_effective.median),
+            threaded: self.threaded(ready, built.all, &options, expected)?,
             p_acc_sp: s.p_accelerated_given_spatial.unwrap_or(0.0),
             replay,
         })
+    }
+
+    /// The same on all threads, if they are more than one.
+    fn on_all_threads(&self, options: &RenderOptions) -> Option<RenderOptions> {
+        (self.threads > 1).then(|| RenderOptions { threads: Some(self.threads), ..options.clone() })
+    }
+
+    fn threaded(
+        &self,
+        ready: &Ready,
+        built: &(Acceleration, BuildReport),
+        options: &RenderOptions,
+        expected: &Image,
+    ) -> Result<Option<Threaded>, Failure> {
+        let Some(options) = self.on_all_threads(options) else { return Ok(None) };
+        let (image, s) = self.render(ready, built, &options)?;
+        same(&image, expected, &options)?;
+        Ok(Some(Threaded { t_build: s.t_build, t_render: self.scale() * s.t_render + s.t_build }))
     }
 
     /// A setting of Table 6.1, measured again and again.
@@ -336,6 +371,20 @@ impl Bench<'_> {
             timer: replay.timer,
         })
     }
+}
+
+/// Fails unless the images are the same bit by bit.
+fn same(image: &Image, expected: &Image, options: &RenderOptions) -> Result<(), Failure> {
+    let bits = |image: &Image| image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
+    if bits(image) == bits(expected) {
+        return Ok(());
+    }
+    let (size, threads) = (options.voxel_size.unwrap_or(1.0), options.threads.unwrap_or(0));
+    Err(Failure::Work(anyhow!(
+        "WRONG IMAGE: {:?} with {}, voxel {size} and {threads} threads differs from none with one thread",
+        options.integrator,
+        options.method
+    )))
 }
 
 /// Tables 6.1 and 6.2 are about the non-directional distance field.

@@ -35,6 +35,8 @@ const SCENES: [ThesisScene; 4] = [
 /// Samples per path segment in these tables; `None` is the path tracer.
 const SETTINGS: [Option<u32>; 4] = [Some(1), Some(7), Some(49), None];
 
+const MOST_THREADS: usize = 1024;
+
 /// Samples per pixel in these tables.
 const SPP: u32 = 4;
 
@@ -50,8 +52,13 @@ pub(crate) fn run(args: &ReportThesisArgs) -> Result<(), Failure> {
     args.files.check()?;
     let thesis = ThesisData::load().map_err(Failure::Work)?;
 
+    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    if !(1..=MOST_THREADS).contains(&threads) {
+        return Err(Failure::Usage(anyhow!("--threads must be from 1 to {MOST_THREADS}, not {threads}")));
+    }
+
     let reporter = Reporter::new(args.files.quiet)?;
-    let bench = Bench { reporter: &reporter, methods: &methods, side, quick: args.quick, seed: args.seed };
+    let bench = Bench { reporter: &reporter, methods: &methods, side, quick: args.quick, seed: args.seed, threads };
     let named = |name: &str| args.scenes.iter().any(|s| s == name);
     let scenes: Vec<ThesisScene> = SCENES.into_iter().filter(|s| named(s.name)).collect();
     let repeated = thesis.repeated_settings().into_iter().filter(|s| named(&s.scene)).collect::<Vec<_>>();
@@ -71,7 +78,7 @@ pub(crate) fn run(args: &ReportThesisArgs) -> Result<(), Failure> {
         return Err(Failure::Interrupted);
     }
 
-    let tables = tables::Tables { thesis: &thesis, scenes: &scenes, repeated: &repeated, measured: &measured };
+    let tables = tables::Tables { thesis: &thesis, threads, scenes: &scenes, repeated: &repeated, measured: &measured };
     let (sections, figures) = tables.all();
     let small = if side == SIDE {
         String::new()
@@ -86,7 +93,7 @@ pub(crate) fn run(args: &ReportThesisArgs) -> Result<(), Failure> {
         lead: vec![
             format!(
                 "Each figure has that of the thesis [Houska2013] beside or below it, where there is one: one thread of an Intel Core i7-3632QM in \
-                 Mitsuba 0.x then, one thread of the machine named below now.{small}"
+                 Mitsuba 0.x then, one thread of the machine named below now, unless a column says otherwise.{small}"
             ),
             "All images were compared bit by bit with those of the hierarchy alone, and every replayed answer with the hierarchy's; all agree. The geometry of \
              san-miguel and scape is generated, not the thesis's; the places of lights and media are not printed there."

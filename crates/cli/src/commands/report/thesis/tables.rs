@@ -2,7 +2,7 @@
 
 use super::{
     data::ThesisData,
-    measure::{MeasuredResult, MethodResult, RepeatedResult, SceneResult, SettingResult},
+    measure::{MeasuredResult, MethodResult, RepeatedResult, SceneResult, SettingResult, Threaded},
 };
 use crate::commands::report::{
     figures::{About, Figure},
@@ -16,6 +16,8 @@ use crate::commands::report::{
 
 pub(super) struct Tables<'a> {
     pub(super) thesis: &'a ThesisData,
+    /// All threads, beside one.
+    pub(super) threads: usize,
     pub(super) scenes: &'a [SceneResult],
     pub(super) repeated: &'a [RepeatedResult<'a>],
     pub(super) measured: &'a [MeasuredResult<'a>],
@@ -180,7 +182,8 @@ impl Tables<'_> {
             figures.push(alone.figure("T_render", "s", setting.t_render, t.map(|t| t.t_render)));
             figures.push(alone.figure("T_query", "s", setting.t_query, t.map(|t| t.t_query)));
             figures.push(alone.figure("p_sp", "", setting.p_sp, t.map(|t| t.p_sp / 100.0)));
-            let mut rows = vec![Row::new(vec![
+            figures.extend(self.threaded_figures(&alone, setting.threaded));
+            let mut cells = vec![
                 "none".into(),
                 "".into(),
                 Cell::beside(seconds(setting.t_render), t.map(|t| seconds(t.t_render))),
@@ -189,7 +192,9 @@ impl Tables<'_> {
                 Cell::beside(percent(setting.p_sp), t.map(|t| printed(t.p_sp))),
                 "".into(),
                 "".into(),
-            ])];
+            ];
+            cells.extend(setting.threaded.iter().flat_map(|all| [seconds(all.t_render).into(), "".into()]));
+            let mut rows = vec![Row::new(cells)];
             let mut size = None;
             for m in &setting.methods {
                 let r = &m.replay;
@@ -202,7 +207,8 @@ impl Tables<'_> {
                     about.figure("T_build", "s", m.t_build, t.and_then(|t| t.t_build)),
                     about.figure("p_acc|sp", "", m.p_acc_sp, t.and_then(|t| t.p_acc_sp).map(|p| p / 100.0)),
                 ]);
-                let cells = vec![
+                figures.extend(self.threaded_figures(&about, m.threaded));
+                let mut cells = vec![
                     r.method.into(),
                     r.voxel_size.to_string().into(),
                     Cell::beside(seconds(m.t_render), t.map(|t| seconds(t.t_render)))
@@ -213,17 +219,39 @@ impl Tables<'_> {
                     Cell::beside(grid(r.grid), t.and_then(|t| t.grid.as_ref()).map(|g| g.replace('x', "×"))),
                     Cell::beside(percent(m.p_acc_sp), t.and_then(|t| t.p_acc_sp).map(printed)),
                 ];
+                for (all, alone) in m.threaded.iter().zip(&setting.threaded) {
+                    let t_render = Cell::from(seconds(all.t_render)).marked(all.t_render < alone.t_render);
+                    cells.extend([t_render, seconds(all.t_build).into()]);
+                }
                 rows.push(Row { cells, first });
             }
             let caption = format!("{}, {SPP} samples per pixel", integrator_name(setting.samples), SPP = super::SPP);
-            let columns = vec!["method", "V_size", "T_render", "T_query", "T_build", "p_sp", "dimensions", "p_acc|sp"];
+            let mut columns =
+                vec!["method", "V_size", "T_render", "T_query", "T_build", "p_sp", "dimensions", "p_acc|sp"];
+            if setting.threaded.is_some() {
+                columns.extend(["T_render, all", "T_build, all"]);
+            }
             Table { caption, columns, rows }
         });
         Section {
             heading: format!("Tables 6.5 to 6.10: {}", scene.name),
+            paragraphs: (self.threads > 1)
+                .then(|| {
+                    format!("T_render and T_build are for one thread, those of *all* for {} threads.", self.threads)
+                })
+                .into_iter()
+                .collect(),
             tables: tables.collect(),
             ..Section::default()
         }
+    }
+
+    fn threaded_figures(&self, about: &About, all: Option<Threaded>) -> Vec<Figure> {
+        let times = |all: Threaded| [("T_render", all.t_render), ("T_build", all.t_build)];
+        let figure = |(quantity, t)| about.figure(quantity, "s", t, None).against(self.threads as f64);
+        // A hierarchy alone builds no more.
+        let kept = |(quantity, _): &(&str, f64)| about.method != "none" || *quantity != "T_build";
+        all.map(times).into_iter().flatten().filter(kept).map(figure).collect()
     }
 
     fn inequality(&self, figures: &mut Vec<Figure>) -> Section {
@@ -241,7 +269,7 @@ impl Tables<'_> {
                         about.figure("gain in queries", "s", gain.queries, None),
                         about.figure("gain in the render", "s", gain.render, None),
                     ]);
-                    let cells = vec![
+                    let mut cells = vec![
                         sps(setting.samples).into(),
                         r.method.into(),
                         r.voxel_size.to_string().into(),
@@ -251,11 +279,19 @@ impl Tables<'_> {
                         Cell::from(seconds(gain.queries)).marked(gain.queries > 0.0),
                         Cell::from(seconds(gain.render)).marked(gain.render > 0.0),
                     ];
+                    if let Some(threaded) = gain.threaded {
+                        figures
+                            .push(about.figure("gain in the render", "s", threaded, None).against(self.threads as f64));
+                        cells.push(Cell::from(seconds(threaded)).marked(threaded > 0.0));
+                    }
                     rows.push(Row { cells, first: i == 0 && !rows.is_empty() });
                 }
             }
-            let columns =
+            let mut columns =
                 vec!["sps", "method", "V_size", "p_acc|sp", "must exceed", "predicted", "in queries", "in the render"];
+            if scene.settings.iter().any(|s| s.threaded.is_some()) {
+                columns.push("on all threads");
+            }
             tables.push(Table { caption: scene.name.to_owned(), columns, rows });
         }
         Section {
@@ -263,8 +299,8 @@ impl Tables<'_> {
             paragraphs: vec![
                 "A method is worth it if p_acc|sp exceeds t_acc/t_query + t_build/t_query, where t_build = T_build/(N p_sp). Predicted is T_render without the \
                  method less T_render with it by 2.6: N p_sp (p_acc|sp t_query − t_acc) − T_build, which takes a proved query to cost as much as any other. \
-                 In queries is the same difference with the times of the replay, fallback and all; in the render is the difference of two renders, noise and all. \
-                 Negative is a loss."
+                 In queries is the same difference with the times of the replay, fallback and all; in the render is the difference of two renders, noise and all, \
+                 and so it is on all threads. Negative is a loss."
                     .to_owned(),
             ],
             tables,
@@ -388,6 +424,7 @@ struct Gain {
     predicted: f64,
     queries: f64,
     render: f64,
+    threaded: Option<f64>,
 }
 
 impl Gain {
@@ -400,6 +437,7 @@ impl Gain {
             predicted: spatial * (m.p_acc_sp * t_query - t_acc) - m.t_build,
             queries: setting.t_query - m.t_query - m.t_build,
             render: setting.t_render - m.t_render,
+            threaded: setting.threaded.zip(m.threaded).map(|(none, with)| none.t_render - with.t_render),
         }
     }
 }
