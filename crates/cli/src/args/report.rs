@@ -93,10 +93,11 @@ pub(crate) struct ReportQueriesArgs {
 /// Measure how costs grow with triangles, voxels, lights and threads, and fit exponents.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Each sweep doubles one thing and leaves the others alone. Exponents are slopes of a least-squares line through the
+    after_help = "Each sweep doubles one thing (refined: times four) and leaves the others alone. Exponents are slopes of a least-squares line through the
 logarithms; the slope of the last step is beside them, since small sizes are not asymptotic.
 
   triangles   san-miguel, 100000 and more: hierarchy, voxels, fields, memory, the time of a query and of a proof
+  refined     cbox_vol2, each triangle split into four, 7680 triangles and more: the same
   voxels      cbox_vol2, as many as cubes of 32 and more a side: all fields and neighbourhoods, memory, t_acc, p_acc|sp
   lights      cbox_vol2 with 1 and more point lights: neighbourhoods, memory, renders
   threads     san-miguel: renders, voxels, fields; the efficiency of more than one
@@ -113,8 +114,8 @@ Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2
 )]
 pub(crate) struct ReportScalingArgs {
     /// Sweeps, separated by commas
-    #[arg(long, value_name = "SWEEP", value_delimiter = ',', default_value = "triangles,voxels,lights,threads",
-        value_parser = ["triangles", "voxels", "lights", "threads"])]
+    #[arg(long, value_name = "SWEEP", value_delimiter = ',', default_value = "triangles,refined,voxels,lights,threads",
+        value_parser = ["triangles", "refined", "voxels", "lights", "threads"])]
     pub(crate) only: Vec<String>,
     /// Smaller sizes, fewer repetitions
     #[arg(long)]

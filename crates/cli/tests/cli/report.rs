@@ -166,12 +166,20 @@ fn scaling_in_miniature() {
     let files = ["--html", "s.html", "--csv", "s.csv", "--json", "s.json", "-q", "--max-threads", "3"];
     let args = ["report", "scaling", "--quick", "--max-triangles", "2e5"];
     let text = sandbox.run(&[&args[..], &small, &files].concat()).succeeded().stdout;
-    for word in ["## Triangles", "## Voxels", "## Lights", "## Threads", "slope of the last step", "Efficiency"] {
+    for word in [
+        "## Triangles\n",
+        "## Triangles of the same shapes",
+        "## Voxels",
+        "## Lights",
+        "## Threads",
+        "slope of the last step",
+        "Efficiency",
+    ] {
         assert!(text.contains(word), "no {word} in {text}");
     }
     let page = String::from_utf8(sandbox.read("s.html")).unwrap();
     check_page(&page);
-    assert_eq!((page.matches("<svg viewBox=\"0 0 480").count(), page.matches("<table>").count()), (12, 15));
+    assert_eq!((page.matches("<svg viewBox=\"0 0 480").count(), page.matches("<table>").count()), (15, 19));
 
     let report = json(&sandbox, "s.json");
     let figures = report["figures"].as_array().unwrap();
@@ -182,6 +190,11 @@ fn scaling_in_miniature() {
     // What does not depend on the clock.
     let hierarchy = values("triangles: Memory", "hierarchy");
     assert!(hierarchy.len() == 2 && hierarchy[0].1 > 36.0 * 1e5 && hierarchy[1].1 > 1.9 * hierarchy[0].1);
+    let (sizes, occupied): (Vec<_>, Vec<_>) =
+        values("refined: Occupied voxels, and p_acc|sp", "occupied").into_iter().unzip();
+    assert_eq!(sizes, [Some(7680.0), Some(30_720.0), Some(122_880.0)]);
+    // Rounded middles of edges leave a few voxels or touch a few more.
+    assert!(occupied.iter().all(|p| (p / occupied[0] - 1.0).abs() < 1e-3), "{occupied:?}");
     let per_voxel = |name| values("voxels: Memory", name).iter().map(|(x, y)| y / x.unwrap()).collect::<Vec<_>>();
     for (bytes, least) in [(per_voxel("ndf"), 1.0), (per_voxel("amr"), 8.0)] {
         assert!(bytes.len() == 2 && bytes.iter().all(|b| (least..1.2 * least).contains(b)), "{bytes:?}");

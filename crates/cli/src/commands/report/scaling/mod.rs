@@ -113,8 +113,9 @@ pub(crate) fn run(args: &ReportScalingArgs) -> Result<(), Failure> {
 fn sweeps(lab: &Lab<'_>, only: &[String]) -> Result<Vec<Sweep>, Failure> {
     type Run = fn(&Lab<'_>) -> Result<Sweep, Failure>;
     let s = lab.settings;
-    let all: [(&str, usize, Run); 4] = [
+    let all: [(&str, usize, Run); 5] = [
         ("triangles", triangles::sizes(s.max_triangles).len(), triangles::run),
+        ("refined", triangles::splits(s.max_triangles).len(), triangles::run_refined),
         ("voxels", voxels::sizes(s.max_voxels_per_side).len(), voxels::run),
         ("lights", lights::sizes(s.max_lights).len(), lights::run),
         ("threads", threads::sizes(s.max_threads).len(), threads::run),
