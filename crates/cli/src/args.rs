@@ -48,9 +48,9 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
     /// Acceleration of visibility queries: none, or a field ndf, amr, dsz or dual, each alone or with -sn or -xsn;
-    /// the image is the same with all
-    #[arg(long, default_value_t, value_name = "METHOD")]
-    pub(crate) method: Method,
+    /// the image is the same with all [default: amr-xsn, or none in a scene without point and area lights]
+    #[arg(long, value_name = "METHOD")]
+    pub(crate) method: Option<Method>,
     /// Side of a voxel in world units [default: a 128th of the scene's longest side]
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,

@@ -2,6 +2,8 @@
 
 use std::{fmt, str::FromStr};
 
+use crate::acceleration::LightShape;
+
 /// How visibility queries are accelerated; see `docs/ARCHITECTURE.md`. All methods give the same image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -73,6 +75,15 @@ impl Method {
     pub fn name(self) -> &'static str {
         NAMES.iter().find(|(method, _)| *method == self).map_or("", |(_, name)| name)
     }
+
+    /// The method for a scene with such emitters where none is asked for: [`Self::default`] if there is one that a neighbourhood can be
+    /// kept for, else [`Self::None`]. Towards an infinite emitter there is but the field, which takes longer than it saves wherever it was measured
+    /// (`docs/performance.md`).
+    #[must_use]
+    pub fn for_lights(lights: &[LightShape<'_>]) -> Self {
+        let somewhere = lights.iter().any(|light| !matches!(light, LightShape::Infinite));
+        if somewhere { Self::default() } else { Self::None }
+    }
 }
 
 impl Default for Method {
@@ -114,5 +125,15 @@ mod tests {
         }
         assert_eq!("AMR".parse::<Method>(), Err(UnknownMethod));
         assert_eq!(Method::default().name(), "amr-xsn");
+    }
+
+    #[test]
+    fn a_scene_with_a_light_somewhere_has_a_method() {
+        let (point, sky) = (LightShape::Point(glam::DVec3::ZERO), LightShape::Infinite);
+        assert_eq!(Method::for_lights(&[sky, point]), Method::default());
+        assert_eq!(Method::for_lights(&[LightShape::Area(&[])]), Method::default());
+        for none in [&[][..], &[sky]] {
+            assert_eq!(Method::for_lights(none), Method::None);
+        }
     }
 }

@@ -8,7 +8,7 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
 use vdf_render::{
-    AttributeValue, IntegratorKind, RenderError, RenderOptions, Rendering, StagedFile, Statistics,
+    AttributeValue, IntegratorKind, Method, RenderError, RenderOptions, Rendering, StagedFile, Statistics,
     TransmittanceEstimator, World, check_writable,
     queries::{QueryStream, record_queries},
     render,
@@ -23,8 +23,9 @@ use crate::{
 };
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let options = options(args)?;
+    let mut options = options(args)?;
     let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
+    options.method = args.method.unwrap_or_else(|| Method::for_lights(&scene.light_shapes()));
     options.validate(&scene)?;
     let output = output(args, &name)?;
     for warning in &scene.warnings {
@@ -90,7 +91,6 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         return Err(Failure::Usage(anyhow!("--max-queries must be at least 1")));
     }
     Ok(RenderOptions {
-        method: args.method,
         voxel_size: args.voxel,
         integrator: integrator(args.integrator, args.samples_per_segment)?,
         transmittance: match args.transmittance {

@@ -54,6 +54,15 @@ fn an_exr_has_the_checksum_of_its_scene() {
 }
 
 #[test]
+fn method_by_default() {
+    let sandbox = Sandbox::new();
+    for scene in ["cbox_vol2", "cbox_light"] {
+        let text = sandbox.render(&[scene, "-o", "fog.exr"]).stdout;
+        assert!(text.contains("method         amr-xsn"), "{text}");
+    }
+}
+
+#[test]
 fn statistics_of_the_plain_method() {
     let sandbox = Sandbox::new();
     sandbox.render(&["--method", "none", "--stats", "fog.json"]);
