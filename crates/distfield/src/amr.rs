@@ -15,7 +15,7 @@
 //! over octants, against its direction: 0 if occupied, else 1 + the minimum over the 7 neighbours in the octant (4.1).
 //! A row takes the minimum over three finished rows, which vectorizes. By the recurrence these rise by at most 1 from voxel to voxel against the
 //! octant's x, and so does their minimum; so along x nothing is to be swept but the distances to the row's own occupied voxels, which are ramps that are copied.
-//! One plane an octant, not eight bytes a voxel: queries towards a light from one region read one or two octants only.
+//! One plane an octant, not eight bytes a voxel together: measured, that is slower towards point lights (docs/performance.md).
 //!
 //! *Limits.* Nothing is proved over 255 voxels or more. An occluder in the octant that is beside the segment, not on it, stops
 //! the proof.
