@@ -13,7 +13,9 @@
 //!
 //! *Cost.* 8·X·Y·Z bytes; two loads a query, up to eight if coordinates are equal. The build is one sweep per octant, in parallel
 //! over octants, against its direction: 0 if occupied, else 1 + the minimum over the 7 neighbours in the octant (4.1).
-//! A row takes the minimum over three finished rows, which vectorizes, and then one serial pass along x.
+//! A row takes the minimum over three finished rows, which vectorizes. By the recurrence these rise by at most 1 from voxel to voxel against the
+//! octant's x, and so does their minimum; so along x nothing is to be swept but the distances to the row's own occupied voxels, which are ramps that are copied.
+//! One plane an octant, not eight bytes a voxel together: measured, that is slower towards point lights (docs/performance.md).
 //!
 //! *Limits.* Nothing is proved over 255 voxels or more. An occluder in the octant that is beside the segment, not on it, stops
 //! the proof.
@@ -21,7 +23,11 @@
 use rayon::prelude::*;
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
-use crate::{FieldError, SafeZones, chessboard_distance, rows, validate};
+use crate::{
+    FieldError, SafeZones, chessboard_distance,
+    rows::{self, Ways},
+    validate,
+};
 
 /// Bits of an octant's number: set where it extends towards smaller coordinates.
 const MINUS_X: usize = 1;
@@ -124,40 +130,35 @@ fn number(x: bool, y: bool, z: bool) -> usize {
 fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
     let Resolution { x, y, z } = occupied.resolution();
     let width = x as usize;
-    // Finished rows are copied here with what is beyond the grid, so that a row has always three.
-    let beyond = vec![rows::FAR; width];
-    let mut current = vec![0; width];
-    let mut nearest = vec![0; width];
-    let mut widened = vec![0; width];
+    let (ways, ahead) = if octant & MINUS_X == 0 { (Ways::Plus, 2) } else { (Ways::Minus, 0) };
+    // The least of the two finished rows ahead on y, in this slice and in the one before.
+    let mut finished = vec![rows::FAR; width];
+    // The least of these and the row ahead on z, between what is beyond the grid.
+    let mut nearest = vec![rows::FAR; width + 2];
     for step_k in 0..z {
         let k = if octant & MINUS_Z == 0 { z - 1 - step_k } else { step_k };
         let next_k = (step_k > 0).then(|| if octant & MINUS_Z == 0 { k + 1 } else { k - 1 });
+        finished.fill(rows::FAR);
         for step_j in 0..y {
             let j = if octant & MINUS_Y == 0 { y - 1 - step_j } else { step_j };
-            let next_j = (step_j > 0).then(|| if octant & MINUS_Y == 0 { j + 1 } else { j - 1 });
-            let row = |j: Option<u32>, k: Option<u32>| match (j, k) {
-                (Some(j), Some(k)) => {
-                    let start = (j as usize + y as usize * k as usize) * width;
-                    &plane[start..start + width]
-                }
-                _ => &beyond,
-            };
-            nearest.copy_from_slice(row(next_j, Some(k)));
-            rows::min_with(&mut nearest, row(Some(j), next_k));
-            rows::min_with(&mut nearest, row(next_j, next_k));
-
-            rows::expand(occupied.row(j, k), &mut current);
-            if octant & MINUS_X == 0 {
-                rows::min_with_next(&mut widened, &nearest);
-                rows::relax(&mut current, &widened);
-                rows::sweep_down(&mut current);
-            } else {
-                rows::min_with_previous(&mut widened, &nearest);
-                rows::relax(&mut current, &widened);
-                rows::sweep_up(&mut current);
+            let start = |k: u32| (j as usize + y as usize * k as usize) * width;
+            match next_k {
+                Some(next) => nearest[1..=width].copy_from_slice(&plane[start(next)..start(next) + width]),
+                None => nearest.fill(rows::FAR),
             }
-            let start = (j as usize + y as usize * k as usize) * width;
-            plane[start..start + width].copy_from_slice(&current);
+            for (nearest, finished) in nearest[1..].iter_mut().zip(&mut finished) {
+                let next = *nearest;
+                *nearest = next.min(*finished);
+                *finished = next;
+            }
+            let row = &mut plane[start(k)..start(k) + width];
+            // Finished rows obey the recurrence, so along x only the distances to the row's own occupied voxels are still to spread.
+            rows::along_row(occupied.row(j, k), row, ways);
+            let nearest = nearest[1..].iter().zip(&nearest[ahead..]);
+            for ((distance, finished), (&beside, &ahead)) in row.iter_mut().zip(&mut finished).zip(nearest) {
+                *distance = beside.min(ahead).saturating_add(1).min(*distance);
+                *finished = (*finished).min(*distance);
+            }
         }
     }
 }

@@ -29,12 +29,6 @@ pub(crate) fn min_with_next(row: &mut [u8], source: &[u8]) {
     min_with(row, source.get(1..).unwrap_or_default());
 }
 
-/// row\[x\] = min(source\[x − 1\], source\[x\]), nothing before the start.
-pub(crate) fn min_with_previous(row: &mut [u8], source: &[u8]) {
-    row.copy_from_slice(source);
-    min_with(row.get_mut(1..).unwrap_or_default(), source);
-}
-
 /// row\[x\] = 1 + `nearest`\[x\] where `row` is not already smaller.
 pub(crate) fn relax(row: &mut [u8], nearest: &[u8]) {
     for (d, &n) in row.iter_mut().zip(nearest) {
