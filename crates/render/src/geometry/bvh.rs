@@ -13,7 +13,7 @@ use obvhs::aabb::Aabb;
 
 use super::{
     intersect::{Segment, SegmentTest},
-    wide::{Tree, TreeRay},
+    wide::{Start, Tree},
 };
 use crate::Triangle;
 
@@ -68,9 +68,9 @@ enum Approach {
     /// It misses the padded bounds or has no length.
     Miss,
     /// The tree's ray, and where it starts: the distance from the segment's start along its largest component, in world units.
-    Ray(TreeRay, f64),
+    Ray(Start, f64),
     /// The tree's ray from the segment's end, because its start is too far away.
-    Backwards(TreeRay),
+    Backwards(Start),
     /// Both ends are so far away that single precision does not do. Hardly any such segment comes near; then all triangles are tested.
     Far,
 }
@@ -138,16 +138,12 @@ impl Bvh {
                 return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
             }
         };
-        self.tree.traverse(ray, |triangle, number| {
-            if let Some(hit) = test.intersect(triangle) {
-                let triangle = number;
-                if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
-                    best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
-                }
-                // Boxes beyond the hit are culled; those within rounding of it are not.
-                return self.ray_parameter(hit.t * test.length() - start);
+        self.tree.traverse(ray, &test, self.scale, |hit, triangle| {
+            if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
+                best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             }
-            f32::INFINITY
+            // Boxes beyond the hit are culled; those within rounding of it are not.
+            self.ray_parameter(hit.t * test.length() - start)
         });
         best
     }
@@ -166,9 +162,9 @@ impl Bvh {
             Approach::Far => return self.all_hits(&test).next().is_some(),
         };
         let mut occluded = false;
-        self.tree.traverse(ray, |triangle, _| {
-            occluded = test.intersect(triangle).is_some();
-            if occluded { f32::NEG_INFINITY } else { f32::INFINITY }
+        self.tree.traverse(ray, &test, self.scale, |_, _| {
+            occluded = true;
+            f32::NEG_INFINITY
         });
         occluded
     }
@@ -185,10 +181,8 @@ impl Bvh {
             Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
             Approach::Far => return self.all_hits(&test).for_each(visit),
         };
-        self.tree.traverse(ray, |triangle, number| {
-            if let Some(hit) = test.intersect(triangle) {
-                visit(Hit { triangle: number, t: hit.t, barycentric: hit.barycentric });
-            }
+        self.tree.traverse(ray, &test, self.scale, |hit, triangle| {
+            visit(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             f32::INFINITY
         });
     }
@@ -208,7 +202,7 @@ impl Bvh {
         })
     }
 
-    #[inline]
+    #[inline(always)]
     fn approach(&self, test: &SegmentTest) -> Approach {
         let direction = test.direction();
         if !(test.length() > 0.0 && direction.is_finite()) {
@@ -249,12 +243,11 @@ impl Bvh {
     }
 
     /// The tree's ray for a segment that starts here, and at which distance it starts.
-    #[inline]
-    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-    fn ray(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<(TreeRay, f64)> {
+    #[inline(always)]
+    fn ray(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<(Start, f64)> {
         let start = self.passes(origin, direction, length, self.pad)?;
         let origin = origin + direction * start;
-        Some((TreeRay::new(origin, direction, self.scale, self.ray_parameter(length - start)), start))
+        Some((Start { origin, direction, end: self.ray_parameter(length - start) }, start))
     }
 
     /// The parameter of a tree's ray at this distance from its start (measured along the largest component), rounded up by more than the

@@ -4,7 +4,7 @@
 //! single precision and lie side by side, so that four are tested at once with nothing but the registers that every x86-64 has. The triangles of a leaf
 //! lie side by side too, and all but the few that the ray comes near are rejected at once in single precision.
 //!
-//! *Guarantee:* [`Tree::traverse`] visits every triangle that the ray's line meets between its start and its end, and some others; each once.
+//! *Guarantee:* [`Tree::traverse`] visits every hit of the segment once, but those beyond the ray's end.
 //!
 //! *Cost:* a node is two cache lines and about 50 instructions, a leaf two and a half and about 80.
 //!
@@ -19,6 +19,7 @@ use obvhs::{
 };
 use smallvec::SmallVec;
 
+use super::intersect::{SegmentTest, TriangleHit};
 use crate::Triangle;
 
 /// Children of a node, and triangles of a leaf: as many as a register holds numbers in single precision.
@@ -75,9 +76,17 @@ struct Leaf {
 
 const NONE: u32 = u32::MAX;
 
+/// Where a ray starts in world coordinates, its direction (with ±1 for the largest component) and where it ends, in tree coordinates along that component.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    pub(super) origin: DVec3,
+    pub(super) direction: DVec3,
+    pub(super) end: f32,
+}
+
 /// A ray in tree coordinates, prepared for boxes and leaves.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct TreeRay {
+struct TreeRay {
     origin: [Vec4; 3],
     inverse: [Vec4; 3],
     /// For each axis 1 if the direction points backwards along it.
@@ -107,38 +116,31 @@ const SMALLEST_COMPONENT: f32 = f32::EPSILON;
 const SHEAR_ERROR: f32 = 32.0 / 16_777_216.0;
 
 impl TreeRay {
-    /// The ray from `origin` (in world coordinates, within the padded bounds) along `direction` (its largest component is ±1) to the parameter `end`.
-    #[inline]
+    /// The ray from `origin` (in world coordinates, within the padded bounds) along `direction` (its largest component is ±1) to the parameter `end`,
+    /// on the line of a segment.
+    #[inline(always)]
     #[allow(clippy::cast_possible_truncation, reason = "the pad and `SHEAR_ERROR` cover the rounding")]
-    pub(super) fn new(origin: DVec3, direction: DVec3, scale: f64, end: f32) -> Self {
-        let size = direction.abs();
-        let axes = if size.x > size.y && size.x > size.z {
-            [1, 2, 0]
-        } else if size.y > size.z {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
-        };
-        let world = origin.as_vec3();
+    fn new(start: Start, segment: &SegmentTest, scale: f64) -> Self {
+        let Start { origin, direction, end } = start;
+        let axes = segment.axes();
+        let o = origin.as_vec3().to_array();
         let line_scale = scale.min(LARGEST_SCALE) as f32;
-        // The last component is ±1, so that to multiply by it is to divide by it.
-        let d = direction.as_vec3();
-        let shear = |axis: usize| Vec4::splat(d[axis] * d[axes[2]].signum() * line_scale);
+        let [x, y] = segment.shear();
         let line = Line {
             axes,
-            origin: axes.map(|axis| Vec4::splat(world[axis])),
+            origin: [Vec4::splat(o[axes[0]]), Vec4::splat(o[axes[1]]), Vec4::splat(o[axes[2]])],
             scale: Vec4::splat(line_scale),
-            shear: [shear(axes[0]), shear(axes[1])],
+            shear: [Vec4::splat(x as f32 * line_scale), Vec4::splat(y as f32 * line_scale)],
         };
-        let start = (origin * scale).as_vec3a();
-        let d = Vec3A::from(d);
+        let o = (origin * scale).as_vec3a();
+        let d = direction.as_vec3a();
         let small = d.abs().cmple(Vec3A::splat(SMALLEST_COMPONENT));
         let d = Vec3A::select(small, d.signum() * SMALLEST_COMPONENT, d);
         let inverse = d.recip();
         Self {
-            origin: [start.x, start.y, start.z].map(Vec4::splat),
-            inverse: [inverse.x, inverse.y, inverse.z].map(Vec4::splat),
-            backwards: [d.x, d.y, d.z].map(|component| usize::from(component < 0.0)),
+            origin: [Vec4::splat(o.x), Vec4::splat(o.y), Vec4::splat(o.z)],
+            inverse: [Vec4::splat(inverse.x), Vec4::splat(inverse.y), Vec4::splat(inverse.z)],
+            backwards: [usize::from(d.x < 0.0), usize::from(d.y < 0.0), usize::from(d.z < 0.0)],
             end,
             line,
         }
@@ -150,17 +152,12 @@ impl TreeRay {
 const LARGEST_SCALE: f64 = 8.507_059_173_023_462e37;
 
 impl Node {
-    const EMPTY: Self = Self {
-        planes: [[Vec4::INFINITY, Vec4::NEG_INFINITY]; 3],
-        children: [Child(0); WIDTH],
-    };
+    const EMPTY: Self = Self { planes: [[Vec4::INFINITY, Vec4::NEG_INFINITY]; 3], children: [Child(0); WIDTH] };
 
     /// Where the ray comes into each box, and in which it comes at all, a bit for each.
     #[inline(always)]
     fn intersect(&self, ray: &TreeRay) -> (Vec4, u32) {
-        let side = |axis: usize, upper: usize| {
-            (self.planes[axis][upper & 1] - ray.origin[axis]) * ray.inverse[axis]
-        };
+        let side = |axis: usize, upper: usize| (self.planes[axis][upper & 1] - ray.origin[axis]) * ray.inverse[axis];
         let [x, y, z] = ray.backwards;
         let near = side(0, x).max(side(1, y)).max(side(2, z).max(Vec4::ZERO));
         let far = side(0, x ^ 1).min(side(1, y ^ 1)).min(side(2, z ^ 1).min(Vec4::splat(ray.end)));
@@ -179,7 +176,7 @@ impl Leaf {
     /// and by the rounding of two products and a difference, 4uL² < 17uL < δL. So 8δ(L + δ) is more than enough, its own rounding included.
     #[inline(always)]
     fn candidates(&self, count: u32, line: &Line) -> u32 {
-        let [x, y, z] = line.axes.map(|axis| &self.vertices[axis]);
+        let [x, y, z] = [&self.vertices[line.axes[0]], &self.vertices[line.axes[1]], &self.vertices[line.axes[2]]];
         let sheared = |v: usize| {
             let z = Vec4::from_array(z[v]) - line.origin[2];
             let x = (Vec4::from_array(x[v]) - line.origin[0]) * line.scale - z * line.shear[0];
@@ -197,6 +194,18 @@ impl Leaf {
         let positive = u.cmpgt(error) | v.cmpgt(error) | w.cmpgt(error);
         let negative = u.cmplt(-error) | v.cmplt(-error) | w.cmplt(-error);
         !(positive & negative).bitmask() & ((1 << count) - 1)
+    }
+
+    /// The exact answer for one triangle.
+    #[inline(always)]
+    fn intersect(&self, i: usize, test: &SegmentTest) -> Option<TriangleHit> {
+        let i = i & (WIDTH - 1);
+        let along = |axis: usize| {
+            let vertices = &self.vertices[axis];
+            [f64::from(vertices[0][i]), f64::from(vertices[1][i]), f64::from(vertices[2][i])]
+        };
+        let [x, y, z] = test.axes();
+        test.intersect_coordinates([along(x), along(y), along(z)], || self.triangle(i))
     }
 
     #[inline]
@@ -295,16 +304,25 @@ impl Tree {
         })
     }
 
-    /// Calls `visit` with the triangles that the ray comes near, and their numbers; boxes in front come first, roughly. The ray ends at the smallest
+    /// Calls `visit` with every hit of the segment and its triangle's number; boxes in front come first, roughly. The ray ends at the smallest
     /// parameter that `visit` returned; −∞ ends the traversal.
     #[inline(always)]
-    pub(super) fn traverse(&self, mut ray: TreeRay, mut visit: impl FnMut(&Triangle, u32) -> f32) {
+    pub(super) fn traverse(
+        &self,
+        start: Start,
+        test: &SegmentTest,
+        scale: f64,
+        mut visit: impl FnMut(TriangleHit, u32) -> f32,
+    ) {
         if self.nodes.is_empty() && self.leaves.len() != 1 {
             for (triangle, number) in self.all() {
-                visit(&triangle, number);
+                if let Some(hit) = test.intersect(&triangle) {
+                    visit(hit, number);
+                }
             }
             return;
         }
+        let mut ray = TreeRay::new(start, test, scale);
         // Nearest last. Three of a node's children wait at most; no tree but one of coincident triangles is so deep that this allocates.
         let mut waiting: SmallVec<[(Child, f32); 64]> = SmallVec::new();
         let mut next = self.root;
@@ -339,7 +357,8 @@ impl Tree {
                 while candidates != 0 {
                     let i = candidates.trailing_zeros() as usize & (WIDTH - 1);
                     candidates &= candidates - 1;
-                    let end = visit(&leaf.triangle(i), leaf.numbers[i]);
+                    let Some(hit) = leaf.intersect(i, test) else { continue };
+                    let end = visit(hit, leaf.numbers[i]);
                     if end < ray.end {
                         if end == f32::NEG_INFINITY {
                             return;
