@@ -226,6 +226,12 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
     let coord = |v: DVec3| robust::Coord3D { x: v.x, y: v.y, z: v.z };
     let [a, b, c] = triangle.vertices_f64().map(coord);
     let (p, q) = (coord(segment.p), coord(segment.q));
+    // First the sides: most close calls are about a start on the triangle's own surface, and miss.
+    let side_p = robust::orient3d(a, b, c, p);
+    let side_q = robust::orient3d(a, b, c, q);
+    if (side_p > 0.0 && side_q > 0.0) || (side_p < 0.0 && side_q < 0.0) || (side_p == 0.0 && side_q == 0.0) {
+        return None;
+    }
     // Twice the weights of c, a and b times the segment's length, up to one common sign.
     let weight_c = robust::orient3d(p, q, a, b);
     let weight_a = robust::orient3d(p, q, b, c);
@@ -234,11 +240,6 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
     let highest = weight_a.max(weight_b).max(weight_c);
     // All zero: the line lies in the triangle's plane, or the triangle or the segment is degenerate.
     if (lowest < 0.0 && highest > 0.0) || (lowest == 0.0 && highest == 0.0) {
-        return None;
-    }
-    let side_p = robust::orient3d(a, b, c, p);
-    let side_q = robust::orient3d(a, b, c, q);
-    if (side_p > 0.0 && side_q > 0.0) || (side_p < 0.0 && side_q < 0.0) || (side_p == 0.0 && side_q == 0.0) {
         return None;
     }
     let sum = weight_a + weight_b + weight_c;

@@ -22,16 +22,22 @@ use smallvec::SmallVec;
 use super::intersect::{SegmentTest, TriangleHit};
 use crate::Triangle;
 
-/// Children of a node, and triangles of a leaf: as many as a register holds numbers in single precision.
+/// Triangles of a leaf: as many as a register holds numbers in single precision.
 const WIDTH: usize = 4;
+
+/// Registers for the children of a node.
+const REGISTERS: usize = 2;
+
+/// Children of a node.
+const CHILDREN: usize = WIDTH * REGISTERS;
 
 /// Four boxes, side by side.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Node {
     /// For each axis the lower planes of the boxes and the upper ones, in tree coordinates. Where there is no child the lower is +∞ and the upper −∞.
-    planes: [[Vec4; 2]; 3],
-    children: [Child; WIDTH],
+    planes: [[[Vec4; REGISTERS]; 2]; 3],
+    children: [Child; CHILDREN],
 }
 
 /// A node, or a leaf and how many triangles it has.
@@ -152,16 +158,26 @@ impl TreeRay {
 const LARGEST_SCALE: f64 = 8.507_059_173_023_462e37;
 
 impl Node {
-    const EMPTY: Self = Self { planes: [[Vec4::INFINITY, Vec4::NEG_INFINITY]; 3], children: [Child(0); WIDTH] };
+    const EMPTY: Self = Self {
+        planes: [[[Vec4::INFINITY; REGISTERS], [Vec4::NEG_INFINITY; REGISTERS]]; 3],
+        children: [Child(0); CHILDREN],
+    };
 
     /// Where the ray comes into each box, and in which it comes at all, a bit for each.
     #[inline(always)]
-    fn intersect(&self, ray: &TreeRay) -> (Vec4, u32) {
-        let side = |axis: usize, upper: usize| (self.planes[axis][upper & 1] - ray.origin[axis]) * ray.inverse[axis];
+    fn intersect(&self, ray: &TreeRay) -> ([f32; CHILDREN], u32) {
         let [x, y, z] = ray.backwards;
-        let near = side(0, x).max(side(1, y)).max(side(2, z).max(Vec4::ZERO));
-        let far = side(0, x ^ 1).min(side(1, y ^ 1)).min(side(2, z ^ 1).min(Vec4::splat(ray.end)));
-        (near, near.cmple(far).bitmask())
+        let mut nears = [0.0; CHILDREN];
+        let mut hits = 0;
+        for (r, nears) in nears.chunks_exact_mut(WIDTH).enumerate() {
+            let side =
+                |axis: usize, upper: usize| (self.planes[axis][upper & 1][r] - ray.origin[axis]) * ray.inverse[axis];
+            let near = side(0, x).max(side(1, y)).max(side(2, z).max(Vec4::ZERO));
+            let far = side(0, x ^ 1).min(side(1, y ^ 1)).min(side(2, z ^ 1).min(Vec4::splat(ray.end)));
+            near.write_to_slice(nears);
+            hits |= near.cmple(far).bitmask() << (r * WIDTH);
+        }
+        (nears, hits)
     }
 }
 
@@ -267,9 +283,9 @@ impl Tree {
             return Child::leaf(self.leaves.len() - 1, numbers.len());
         }
         let first = binary.nodes[from].first_index as usize;
-        let mut children: SmallVec<[usize; WIDTH]> = SmallVec::from_slice(&[first, first + 1]);
+        let mut children: SmallVec<[usize; CHILDREN]> = SmallVec::from_slice(&[first, first + 1]);
         let area = |i: usize| binary.nodes[i].aabb().half_area();
-        while children.len() < WIDTH {
+        while children.len() < CHILDREN {
             let open = (0..children.len()).filter(|&i| counts[children[i]] == 0);
             let Some(i) = open.max_by(|&i, &j| area(children[i]).total_cmp(&area(children[j]))) else { break };
             let first = binary.nodes[children[i]].first_index as usize;
@@ -283,8 +299,8 @@ impl Tree {
             let bounds = binary.nodes[child].aabb();
             let node = &mut self.nodes[index];
             for (axis, planes) in node.planes.iter_mut().enumerate() {
-                planes[0][i] = bounds.min[axis];
-                planes[1][i] = bounds.max[axis];
+                planes[0][i / WIDTH][i % WIDTH] = bounds.min[axis];
+                planes[1][i / WIDTH][i % WIDTH] = bounds.max[axis];
             }
             node.children[i] = added;
         }
@@ -331,9 +347,8 @@ impl Tree {
                 let node = &self.nodes[next.index()];
                 let (near, mut hits) = node.intersect(&ray);
                 if hits != 0 {
-                    let near = near.to_array();
                     let mut take = || {
-                        let i = hits.trailing_zeros() as usize & (WIDTH - 1);
+                        let i = hits.trailing_zeros() as usize & (CHILDREN - 1);
                         hits &= hits - 1;
                         ((node.children[i], near[i]), hits != 0)
                     };
