@@ -1,4 +1,4 @@
-//! The fallback: a bounding volume hierarchy (obvhs \[Ylitie2017, Meister2018\]) over exact triangle tests.
+//! The fallback: a bounding volume hierarchy (\[Ylitie2017, Meister2018\], built by obvhs) over exact triangle tests.
 //!
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test,
 //! so it never culls a triangle that the exact test would hit, and ties are broken by the triangle's number: no
@@ -54,8 +54,8 @@ impl std::fmt::Debug for Bvh {
 
 /// Padding of boxes in tree coordinates, where the largest coordinate m is below 1. With rays that start in the padded
 /// bounds, and so are no longer than their diagonal of 2√3, a point on the ray in a box test is off by at most (in units of
-/// 2⁻²⁴): origin 1, direction 2·2√3, clamp of small direction components 2·2√3, quantization of the boxes 2, the slab test
-/// (p − o)/d + q/d: three roundings of a term of at most 2, two of another, one of the sum 2√3. That is below 33; about twice as much is taken.
+/// 2⁻²⁴): origin 1, direction 2·2√3, clamp of small direction components 2·2√3, rounding of the boxes 1, the slab test
+/// (b − o)·(1/d): 2 each for the difference, at most 2, the reciprocal and the product. That is below 22; about three times as much is taken.
 const PAD: f64 = 64.0 / 16_777_216.0;
 
 /// Segments with both ends farther away than this, in multiples of the largest coordinate, are not traced in single precision.

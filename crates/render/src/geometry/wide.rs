@@ -1,14 +1,14 @@
-//! The tree under [`Bvh`](super::Bvh): nodes of four boxes, leaves of up to four triangles.
+//! The tree under [`Bvh`](super::Bvh): nodes of eight boxes, leaves of up to four triangles.
 //!
-//! *Idea:* obvhs builds a binary tree \[Meister2018\]; here it is collapsed to nodes of four children \[Wald2008\], whose boxes stay
-//! single precision and lie side by side, so that four are tested at once with nothing but the registers that every x86-64 has. The triangles of a leaf
-//! lie side by side too, and all but the few that the ray comes near are rejected at once in single precision.
+//! *Idea:* obvhs builds a binary tree \[Meister2018\]; here it is collapsed to nodes of eight children \[Ylitie2017\], but their boxes stay in single
+//! precision and lie side by side: four are tested at once with the registers that every x86-64 has, and nothing is unpacked. The triangles of a leaf
+//! lie side by side too, and all but the few that the line comes near are rejected at once in single precision.
 //!
 //! *Guarantee:* [`Tree::traverse`] visits every hit of the segment once, but those beyond the ray's end.
 //!
-//! *Cost:* a node is two cache lines and about 50 instructions, a leaf two and a half and about 80.
+//! *Cost:* a node is four cache lines, a leaf two and a half.
 //!
-//! *Limits:* 2²⁹ triangles; [`Tree::new`] builds nothing for more, and then all are visited.
+//! *Limits:* 2²⁹ triangles; over more there are no nodes, and all triangles are tested.
 
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use obvhs::{
@@ -31,7 +31,7 @@ const REGISTERS: usize = 2;
 /// Children of a node.
 const CHILDREN: usize = WIDTH * REGISTERS;
 
-/// Four boxes, side by side.
+/// Eight boxes, side by side.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Node {
@@ -185,11 +185,15 @@ impl Leaf {
     /// Which of the first `count` triangles the line may meet, a bit for each.
     ///
     /// Rejects a triangle only if of the three edge functions of \[Woop2013\] one is certainly positive and one certainly negative. In units of
-    /// u = 2⁻²⁴ and of tree coordinates, in which all vertices and the line's start are at most 1: the start is off the line by at most 8 (see
-    /// `FAR` in `bvh.rs`) and rounded by 1, which the shear doubles, 18; a difference of vertex and start, at most 2, is rounded by 2, again doubled, 4;
-    /// the shear's factor is rounded by 1, times 2, its product 2; the last difference, at most 4, by 4. So a sheared coordinate errs by
-    /// δ = 30u (`SHEAR_ERROR` is 32u). With L the largest of them that was computed, at most 4 + δ, an edge function cx·by − cy·bx errs by at most 4δL + 2δ²
-    /// and by the rounding of two products and a difference, 4uL² < 17uL < δL. So 8δ(L + δ) is more than enough, its own rounding included.
+    /// u = 2⁻²⁴ and of tree coordinates, in which vertices and the line's start are at most 1 (but for the pad): the start is off the line by at most 8
+    /// (see `FAR` in `bvh.rs`) and rounded by 1, which the shear doubles, 18; a difference of vertex and start, at most 2, is rounded by 2, again
+    /// doubled, 4; the shear's factor is rounded by 1, times 2, its product by 2; the last difference, at most 4, by 4. So a sheared coordinate errs by
+    /// δ = 30u ([`SHEAR_ERROR`] is 32u). With L the largest of them that was computed, at most 4 + δ, an edge function cx·by − cy·bx errs by at most
+    /// 4δL + 2δ² and by the rounding of two products and a difference, 4uL² < 17uL < δL. So 8δ(L + δ) is more than enough: the rest is for its own
+    /// rounding, and for 8u of δ more where the scale is so small that the shear's factor loses bits.
+    ///
+    /// Where world coordinates overflow nothing is rejected: a vertex with NaN leaves only one edge function that is a number, and with infinity
+    /// alone the bound is infinite.
     #[inline(always)]
     fn candidates(&self, count: u32, line: &Line) -> u32 {
         let [x, y, z] = [&self.vertices[line.axes[0]], &self.vertices[line.axes[1]], &self.vertices[line.axes[2]]];
@@ -206,7 +210,6 @@ impl Leaf {
         let size = |p: [Vec4; 2]| p[0].abs().max(p[1].abs());
         let largest = size(a).max(size(b)).max(size(c));
         let error = (largest + SHEAR_ERROR) * (8.0 * SHEAR_ERROR);
-        // Comparisons with NaN, where world coordinates overflow, are false, and so reject nothing.
         let positive = u.cmpgt(error) | v.cmpgt(error) | w.cmpgt(error);
         let negative = u.cmplt(-error) | v.cmplt(-error) | w.cmplt(-error);
         !(positive & negative).bitmask() & ((1 << count) - 1)
@@ -234,7 +237,8 @@ impl Leaf {
 
 /// The nodes and leaves.
 pub(super) struct Tree {
-    root: Child,
+    /// None if there are no nodes; then all leaves are visited.
+    root: Option<Child>,
     nodes: Vec<Node>,
     leaves: Vec<Leaf>,
 }
@@ -242,18 +246,12 @@ pub(super) struct Tree {
 impl Tree {
     /// The tree over triangles with these boxes, in tree coordinates. Cost: O(n log n).
     pub(super) fn new(triangles: &[Triangle], boxes: &[Aabb]) -> Self {
-        let mut tree = Self { root: Child(0), nodes: Vec::new(), leaves: Vec::new() };
         let n = match u32::try_from(boxes.len()) {
             Ok(n) if n < 1 << 29 => n,
-            _ => {
-                // Leaves without nodes, see `traverse`.
-                let numbers: Vec<u32> = (0..u32::MAX).take(triangles.len()).collect();
-                tree.leaves = numbers.chunks(WIDTH).map(|numbers| leaf(triangles, numbers)).collect();
-                return tree;
-            }
+            _ => return Self::without_nodes(triangles),
         };
         if n == 0 {
-            return tree;
+            return Self::without_nodes(&[]);
         }
         let p = BvhBuildParams::medium_build();
         let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
@@ -266,12 +264,18 @@ impl Tree {
         ReinsertionOptimizer::default().run(&mut binary, p.reinsertion_batch_ratio, None);
         let mut counts = vec![0; binary.nodes.len()];
         choose_leaves(&binary, 0, &mut counts);
-        tree.nodes.reserve(boxes.len() / 6);
-        tree.leaves.reserve(boxes.len() / 2);
-        tree.root = tree.add(&binary, &counts, triangles, 0);
+        let mut tree = Self { root: None, nodes: Vec::new(), leaves: Vec::new() };
+        tree.root = Some(tree.add(&binary, &counts, triangles, 0));
         tree.nodes.shrink_to_fit();
         tree.leaves.shrink_to_fit();
         tree
+    }
+
+    /// Leaves only.
+    fn without_nodes(triangles: &[Triangle]) -> Self {
+        let numbers: Vec<u32> = (0..NONE).take(triangles.len()).collect();
+        let leaves = numbers.chunks(WIDTH).map(|numbers| leaf(triangles, numbers)).collect();
+        Self { root: None, nodes: Vec::new(), leaves }
     }
 
     /// Adds what is under a binary node.
@@ -330,18 +334,17 @@ impl Tree {
         scale: f64,
         mut visit: impl FnMut(TriangleHit, u32) -> f32,
     ) {
-        if self.nodes.is_empty() && self.leaves.len() != 1 {
+        let Some(mut next) = self.root else {
             for (triangle, number) in self.all() {
                 if let Some(hit) = test.intersect(&triangle) {
                     visit(hit, number);
                 }
             }
             return;
-        }
+        };
         let mut ray = TreeRay::new(start, test, scale);
-        // Nearest last. Three of a node's children wait at most; no tree but one of coincident triangles is so deep that this allocates.
+        // Seven of a node's children wait at most, and hardly ever more than two: no tree but one of coincident triangles makes this allocate.
         let mut waiting: SmallVec<[(Child, f32); 64]> = SmallVec::new();
-        let mut next = self.root;
         loop {
             if next.triangles() == 0 {
                 let node = &self.nodes[next.index()];
@@ -393,10 +396,10 @@ impl Tree {
     }
 }
 
-/// What a binary node costs a ray that comes into it, beside a leaf: a wide node takes the place of some two or three of them.
+/// What a binary node costs a ray that comes into it, beside a leaf: a wide node takes the place of several.
 const NODE_COST: f32 = 0.5;
 
-/// Marks the binary nodes that become leaves, with the number of their triangles, where that is no dearer than to go on \[Wald2008\]. Returns the number
+/// Marks the binary nodes that become leaves, with the number of their triangles, where that is no dearer than to go on. Returns the number
 /// of triangles and the cost below the node.
 fn choose_leaves(binary: &Bvh2, from: usize, counts: &mut [u32]) -> (u32, f32) {
     let node = &binary.nodes[from];
@@ -441,4 +444,61 @@ fn leaf(triangles: &[Triangle], numbers: &[u32]) -> Leaf {
         }
     }
     leaf
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Segment;
+
+    /// What is built for more triangles than a child can number.
+    #[test]
+    fn without_nodes_all_triangles_are_visited() {
+        let triangles: Vec<_> = (0..11_u8)
+            .map(|i| {
+                let z = Vec3::Z * f32::from(i);
+                Triangle::new(z, Vec3::X + z, Vec3::Y + z)
+            })
+            .collect();
+        let p = DVec3::new(0.25, 0.25, -1.0);
+        let test = SegmentTest::new(Segment::new(p, p + DVec3::Z * 20.0), DVec3::ZERO, DVec3::splat(10.0));
+        let start = Start { origin: p, direction: DVec3::Z, end: 2.0 };
+        let mut numbers = Vec::new();
+        Tree::without_nodes(&triangles).traverse(start, &test, 0.0625, |_, number| {
+            numbers.push(number);
+            f32::INFINITY
+        });
+        assert_eq!(numbers, (0..11).collect::<Vec<_>>());
+    }
+
+    /// Lines through vertices and edges of small triangles, from near and far within the bounds: whatever the exact test hits is a candidate, and of those
+    /// that the line passes at a tenth of their size nearly none is.
+    #[test]
+    fn candidates_are_all_that_is_hit_and_little_else() {
+        let mut noise = crate::Sampler::new(11, 0, 0, 0);
+        let mut uniform = |size: f64| DVec3::from_array([(); 3].map(|()| size * (2.0 * noise.next_1d() - 1.0)));
+        let (mut hits, mut beside, mut false_calls) = (0, 0, 0);
+        for i in 0..40_000 {
+            let size = [0.5, 0.05, 0.005][i % 3];
+            let vertices = [(); 3].map(|()| uniform(1.0 - size));
+            let (o, a, b) = (vertices[0], uniform(size), uniform(size));
+            let t = Triangle { vertices: [o, o + a, o + b].map(|v| v.as_vec3()) };
+            let leaf = leaf(&[t], &[0]);
+            let [a, b, c] = t.vertices_f64();
+            let target = [a, a + (b - a) * 0.375, (a + b + c) / 3.0, a + (a - b) * 0.1 + (a - c) * 0.1][i / 3 % 4];
+            let p = if i % 2 == 0 { vertices[1] } else { target + (vertices[1] - target) * size };
+            let segment = Segment::new(p, p + (target - p) * 1.5);
+            let test = SegmentTest::new(segment, DVec3::NEG_ONE, DVec3::ONE);
+            let start = Start { origin: p, direction: test.direction(), end: 8.0 };
+            let candidate = leaf.candidates(1, &TreeRay::new(start, &test, 1.0).line) == 1;
+            if test.intersect(&t).is_some() {
+                hits += 1;
+                assert!(candidate, "{segment:?} {t:?}");
+            } else if i / 3 % 4 == 3 {
+                beside += 1;
+                false_calls += usize::from(candidate);
+            }
+        }
+        assert!(hits > 15_000 && beside > 9000 && false_calls < beside / 20, "{hits} {beside} {false_calls}");
+    }
 }
