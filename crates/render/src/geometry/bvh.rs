@@ -1,4 +1,4 @@
-//! The fallback: a bounding volume hierarchy (obvhs \[Ylitie2017, Meister2018\]) over exact triangle tests.
+//! The fallback: a bounding volume hierarchy (\[Ylitie2017, Meister2018\], built by obvhs) over exact triangle tests.
 //!
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test,
 //! so it never culls a triangle that the exact test would hit, and ties are broken by the triangle's number: no
@@ -8,19 +8,13 @@
 //! precision neither overflows nor underflows whatever the unit of the scene, and the absolute constants inside obvhs have
 //! one known weight.
 
-use glam::{DVec3, UVec2, Vec3A, uvec2};
-use obvhs::{
-    BvhBuildParams,
-    aabb::Aabb,
-    bvh2::reinsertion::ReinsertionOptimizer,
-    cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh},
-    fast_stack,
-    ploc::PlocBuilder,
-    ray::Ray,
-    traverse,
-};
+use glam::{DVec3, Vec3A};
+use obvhs::aabb::Aabb;
 
-use super::intersect::{Segment, SegmentTest};
+use super::{
+    intersect::{Segment, SegmentTest},
+    wide::{Start, Tree},
+};
 use crate::Triangle;
 
 /// The first triangle along a segment.
@@ -36,13 +30,9 @@ pub struct Hit {
 
 /// A hierarchy over triangles; immutable and shared by all threads.
 pub struct Bvh {
-    tree: CwBvh,
-    /// Levels of nodes: as many groups of nodes may wait during a traversal.
-    depth: usize,
-    /// In the order of the tree's leaves, for locality.
-    triangles: Vec<Triangle>,
-    /// The number that each of `triangles` had when it was given.
-    numbers: Vec<u32>,
+    tree: Tree,
+    /// How many triangles there are.
+    triangles: usize,
     /// Bounds of all triangles; `min > max` if there are none.
     min: DVec3,
     max: DVec3,
@@ -55,7 +45,7 @@ pub struct Bvh {
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Bvh")
-            .field("triangles", &self.triangles.len())
+            .field("triangles", &self.triangles)
             .field("min", &self.min)
             .field("max", &self.max)
             .finish()
@@ -64,16 +54,9 @@ impl std::fmt::Debug for Bvh {
 
 /// Padding of boxes in tree coordinates, where the largest coordinate m is below 1. With rays that start in the padded
 /// bounds, and so are no longer than their diagonal of 2√3, a point on the ray in a box test is off by at most (in units of
-/// 2⁻²⁴): origin 1, direction 2·2√3, clamp of small direction components 2·2√3, quantization of the boxes 2, the slab test
-/// (p − o)/d + q/d: three roundings of a term of at most 2, two of another, one of the sum 2√3. That is below 33; about twice as much is taken.
+/// 2⁻²⁴): origin 1, direction 2·2√3, clamp of small direction components 2·2√3, rounding of the boxes 1, the slab test
+/// (b − o)·(1/d): 2 each for the difference, at most 2, the reciprocal and the product. That is below 22; about three times as much is taken.
 const PAD: f64 = 64.0 / 16_777_216.0;
-
-/// Largest component of a ray's direction in tree coordinates. obvhs takes no box that a ray leaves before 10⁻⁴ in its parameter; a ray that meets
-/// a triangle stays in its padded box for at least `PAD`, which is at least 2⁻⁷ in the parameter.
-const SPEED: f64 = 1.0 / 4096.0;
-
-/// The smallest component of a direction, 2⁻²³ of the largest; keeps reciprocals finite.
-const SMALLEST_COMPONENT: f32 = (SPEED * f32::EPSILON as f64) as f32;
 
 /// Segments with both ends farther away than this, in multiples of the largest coordinate, are not traced in single precision.
 /// A point computed from the start is off by at most some 16·2⁻⁵³ times the start's distance: up to here by 2⁻²¹ of the
@@ -85,9 +68,9 @@ enum Approach {
     /// It misses the padded bounds or has no length.
     Miss,
     /// The tree's ray, and where it starts: the distance from the segment's start along its largest component, in world units.
-    Ray(Ray, f64),
+    Ray(Start, f64),
     /// The tree's ray from the segment's end, because its start is too far away.
-    Backwards(Ray),
+    Backwards(Start),
     /// Both ends are so far away that single precision does not do. Hardly any such segment comes near; then all triangles are tested.
     Far,
 }
@@ -121,25 +104,20 @@ impl Bvh {
                 Aabb::new(b.min - pad, b.max + pad)
             })
             .collect();
-        let tree = build(&boxes);
-        let numbers = tree.primitive_indices.clone();
-        let ordered = numbers.iter().map(|&i| triangles[i as usize]).collect();
-        Self { depth: depth(&tree), tree, triangles: ordered, numbers, min, max, scale, pad: PAD / scale }
+        let tree = Tree::new(triangles, &boxes);
+        Self { tree, triangles: triangles.len(), min, max, scale, pad: PAD / scale }
     }
 
     /// Bounds of the triangles, `None` if there are none.
     #[must_use]
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        (!self.triangles.is_empty()).then_some((self.min, self.max))
+        (self.triangles > 0).then_some((self.min, self.max))
     }
 
-    /// Bytes of the nodes and of the triangles in the order of the leaves, with their numbers.
+    /// Bytes of the nodes and of the leaves, which hold the triangles.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.tree.nodes[..])
-            + size_of_val(&self.tree.primitive_indices[..])
-            + size_of_val(&self.triangles[..])
-            + size_of_val(&self.numbers[..])
+        self.tree.bytes()
     }
 
     /// The first triangle that the closed segment meets. Cost: about 100 ns in a Cornell box.
@@ -160,16 +138,12 @@ impl Bvh {
                 return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
             }
         };
-        self.traverse(ray, |slot| {
-            if let Some(hit) = test.intersect(&self.triangles[slot]) {
-                let triangle = self.numbers[slot];
-                if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
-                    best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
-                }
-                // Boxes beyond the hit are culled; those within rounding of it are not.
-                return self.ray_parameter(hit.t * test.length() - start);
+        self.tree.traverse(ray, &test, self.scale, |hit, triangle| {
+            if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
+                best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             }
-            f32::INFINITY
+            // Boxes beyond the hit are culled; those within rounding of it are not.
+            self.ray_parameter(hit.t * test.length() - start)
         });
         best
     }
@@ -188,9 +162,9 @@ impl Bvh {
             Approach::Far => return self.all_hits(&test).next().is_some(),
         };
         let mut occluded = false;
-        self.traverse(ray, |slot| {
-            occluded = test.intersect(&self.triangles[slot]).is_some();
-            if occluded { f32::NEG_INFINITY } else { f32::INFINITY }
+        self.tree.traverse(ray, &test, self.scale, |_, _| {
+            occluded = true;
+            f32::NEG_INFINITY
         });
         occluded
     }
@@ -207,10 +181,8 @@ impl Bvh {
             Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
             Approach::Far => return self.all_hits(&test).for_each(visit),
         };
-        self.traverse(ray, |slot| {
-            if let Some(hit) = test.intersect(&self.triangles[slot]) {
-                visit(Hit { triangle: self.numbers[slot], t: hit.t, barycentric: hit.barycentric });
-            }
+        self.tree.traverse(ray, &test, self.scale, |hit, triangle| {
+            visit(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             f32::INFINITY
         });
     }
@@ -222,46 +194,15 @@ impl Bvh {
         segment.p.max(segment.q).cmplt(self.min).any() || segment.p.min(segment.q).cmpgt(self.max).any()
     }
 
-    /// Calls `visit` with the slots of all triangles in whose boxes the ray comes. The ray ends at the smallest parameter that `visit`
-    /// returned; −∞ ends the traversal.
-    #[inline(always)]
-    fn traverse(&self, mut ray: Ray, mut visit: impl FnMut(usize) -> f32) {
-        if self.tree.nodes.is_empty() {
-            return;
-        }
-        // obvhs's own traversals have room for 32 levels, which is not enough where many triangles coincide; and it takes time to clear them.
-        fast_stack!(UVec2, (4, 32), self.depth, stack, {
-            let mut state = Traversal {
-                stack,
-                current_group: uvec2(0, 0x8000_0000),
-                primitive_group: UVec2::ZERO,
-                oct_inv4: octant(ray.direction),
-                primitive_id: 0,
-                hitmask: 0,
-            };
-            let mut node;
-            traverse!(self.tree, node, state, node.intersect_ray(&ray, state.oct_inv4), {
-                let t = visit(state.primitive_id as usize);
-                if t < ray.tmax {
-                    if t == f32::NEG_INFINITY {
-                        return;
-                    }
-                    ray.tmax = t;
-                }
-            });
-        });
-    }
-
     /// All hits of a segment, without the tree.
     #[cold]
     fn all_hits<'a>(&'a self, test: &'a SegmentTest) -> impl Iterator<Item = Hit> + 'a {
-        let slots = self.triangles.iter().zip(&self.numbers);
-        slots.filter_map(|(triangle, &number)| {
-            test.intersect(triangle).map(|hit| Hit { triangle: number, t: hit.t, barycentric: hit.barycentric })
+        self.tree.all().filter_map(|(triangle, number)| {
+            test.intersect(&triangle).map(|hit| Hit { triangle: number, t: hit.t, barycentric: hit.barycentric })
         })
     }
 
-    #[inline]
+    #[inline(always)]
     fn approach(&self, test: &SegmentTest) -> Approach {
         let direction = test.direction();
         if !(test.length() > 0.0 && direction.is_finite()) {
@@ -302,22 +243,11 @@ impl Bvh {
     }
 
     /// The tree's ray for a segment that starts here, and at which distance it starts.
-    #[inline]
-    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-    fn ray(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<(Ray, f64)> {
+    #[inline(always)]
+    fn ray(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<(Start, f64)> {
         let start = self.passes(origin, direction, length, self.pad)?;
         let origin = origin + direction * start;
-        let direction = Vec3A::from((direction * SPEED).as_vec3());
-        let small = direction.abs().cmple(Vec3A::splat(SMALLEST_COMPONENT));
-        let direction = Vec3A::select(small, direction.signum() * SMALLEST_COMPONENT, direction);
-        let ray = Ray {
-            origin: Vec3A::from((origin * self.scale).as_vec3()),
-            direction,
-            inv_direction: direction.recip(),
-            tmin: 0.0,
-            tmax: self.ray_parameter(length - start),
-        };
-        Some((ray, start))
+        Some((Start { origin, direction, end: self.ray_parameter(length - start) }, start))
     }
 
     /// The parameter of a tree's ray at this distance from its start (measured along the largest component), rounded up by more than the
@@ -325,56 +255,6 @@ impl Bvh {
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
     fn ray_parameter(&self, distance: f64) -> f32 {
-        ((distance * (1.0 + 1e-6) + self.pad) * (self.scale / SPEED)) as f32
+        ((distance * (1.0 + 1e-6) + self.pad) * self.scale) as f32
     }
-}
-
-/// What obvhs's `traverse!` keeps, with a stack of any size.
-struct Traversal<S> {
-    stack: S,
-    current_group: UVec2,
-    primitive_group: UVec2,
-    oct_inv4: u32,
-    primitive_id: u32,
-    hitmask: u32,
-}
-
-/// In each byte which child is nearest for a direction: a bit is set for each axis along which it does not point backwards.
-#[inline]
-fn octant(direction: Vec3A) -> u32 {
-    let forwards = |component: f32, bit: u32| if component < 0.0 { 0 } else { bit };
-    (forwards(direction.x, 4) | forwards(direction.y, 2) | forwards(direction.z, 1)) * 0x0101_0101
-}
-
-/// The steps of obvhs's `build_cwbvh` without its check in debug builds, which refuses deep trees.
-fn build(boxes: &[Aabb]) -> CwBvh {
-    let Ok(n) = u32::try_from(boxes.len()) else { return CwBvh::default() };
-    if n == 0 {
-        return CwBvh::default();
-    }
-    let p = BvhBuildParams::medium_build();
-    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
-        p.ploc_search_distance,
-        boxes,
-        (0..n).collect(),
-        p.sort_precision,
-        p.search_depth_threshold,
-    );
-    ReinsertionOptimizer::default().run(&mut binary, p.reinsertion_batch_ratio, None);
-    bvh2_to_cwbvh(&binary, 3, true, false)
-}
-
-/// The number of levels of nodes.
-fn depth(tree: &CwBvh) -> usize {
-    let mut levels = 0;
-    let mut level: Vec<usize> = if tree.nodes.is_empty() { vec![] } else { vec![0] };
-    while !level.is_empty() {
-        levels += 1;
-        let children = |&i: &usize| {
-            let first = tree.nodes[i].child_base_idx as usize;
-            first..first + tree.nodes[i].imask.count_ones() as usize
-        };
-        level = level.iter().flat_map(children).collect();
-    }
-    levels
 }

@@ -68,16 +68,18 @@ pub struct SegmentTest {
     direction: DVec3,
     /// That component's size, in world units.
     length: f64,
-    /// The rows of the shear: a sheared coordinate is the dot product of one with a difference of points. Choosing
-    /// axes by multiplication with 0 and 1 is exact, and faster than by index.
-    rows: [DVec3; 3],
+    /// The axis of the largest component is the last. Those before it are in cyclic order, which keeps the orientation, or exchanged if the segment points
+    /// backwards along the last, which would mirror.
+    axes: [usize; 3],
+    /// By how much the first two coordinates change with the last.
+    shear: [f64; 2],
+    /// The reciprocal of the largest component, with its sign.
+    scale: f64,
     /// Largest error of an edge function, for triangles in the bounds given.
     edge_error: f64,
     /// Largest error of `T` and of `T − det`, see [`SegmentTest::intersect`].
     t_error: f64,
 }
-
-const AXES: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
 
 /// Half an ulp of 1 in double precision.
 const U: f64 = f64::EPSILON / 2.0;
@@ -103,7 +105,6 @@ impl SegmentTest {
         } else {
             2
         };
-        // Cyclic order keeps the orientation; a negative z would mirror, so x and y are exchanged.
         let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
         let vector = d;
         let d = d.to_array();
@@ -122,7 +123,9 @@ impl SegmentTest {
             segment,
             direction,
             length,
-            rows: [AXES[x] - AXES[z] * (d[x] * scale_z), AXES[y] - AXES[z] * (d[y] * scale_z), AXES[z] * scale_z],
+            axes: [x, y, z],
+            shear: [d[x] * scale_z, d[y] * scale_z],
+            scale: scale_z,
             edge_error: if usable { 128.0 * U * m2 } else { f64::INFINITY },
             t_error: 1024.0 * U * m2 * (m * scale_z.abs()).max(1.0),
         }
@@ -149,11 +152,42 @@ impl SegmentTest {
         self.length
     }
 
+    /// The axes in the order of the shear: that of the segment's largest component is the last.
+    #[inline]
+    pub(super) const fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// By how much coordinates along the first two axes change with the last.
+    #[inline]
+    pub(super) const fn shear(&self) -> [f64; 2] {
+        self.shear
+    }
+
     /// Exactly: do segment and triangle meet? If so, where (rounded)?
     #[inline(always)]
     #[must_use]
     pub fn intersect(&self, triangle: &Triangle) -> Option<TriangleHit> {
-        let [a, b, c] = triangle.vertices_f64().map(|v| self.sheared(v));
+        let [a, b, c] = triangle.vertices_f64().map(|v| v.to_array());
+        self.intersect_coordinates(self.axes.map(|axis| [a[axis], b[axis], c[axis]]), || *triangle)
+    }
+
+    /// The same from the vertices' coordinates along each of [`SegmentTest::axes`]; the triangle is asked for where the call is close.
+    #[inline(always)]
+    pub(super) fn intersect_coordinates(
+        &self,
+        coordinates: [[f64; 3]; 3],
+        triangle: impl FnOnce() -> Triangle,
+    ) -> Option<TriangleHit> {
+        let [x, y, z] = coordinates;
+        let p = self.segment.p.to_array();
+        let p = [p[self.axes[0]], p[self.axes[1]], p[self.axes[2]]];
+        // The vertex relative to the start, sheared so that the segment runs along z from 0 to 1.
+        let sheared = |v: usize| {
+            let z = z[v] - p[2];
+            [x[v] - p[0] - self.shear[0] * z, y[v] - p[1] - self.shear[1] * z, z * self.scale]
+        };
+        let (a, b, c) = (sheared(0), sheared(1), sheared(2));
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];
@@ -181,14 +215,7 @@ impl SegmentTest {
                 return Some(TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] });
             }
         }
-        intersect_exact(&self.segment, triangle)
-    }
-
-    /// The vertex relative to the start, sheared so that the segment runs along z from 0 to 1.
-    #[inline]
-    fn sheared(&self, v: DVec3) -> [f64; 3] {
-        let v = v - self.segment.p;
-        self.rows.map(|row| row.dot(v))
+        intersect_exact(&self.segment, &triangle())
     }
 }
 
@@ -199,6 +226,12 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
     let coord = |v: DVec3| robust::Coord3D { x: v.x, y: v.y, z: v.z };
     let [a, b, c] = triangle.vertices_f64().map(coord);
     let (p, q) = (coord(segment.p), coord(segment.q));
+    // First the sides: most close calls are about a start on the triangle's own surface, and miss.
+    let side_p = robust::orient3d(a, b, c, p);
+    let side_q = robust::orient3d(a, b, c, q);
+    if (side_p > 0.0 && side_q > 0.0) || (side_p < 0.0 && side_q < 0.0) || (side_p == 0.0 && side_q == 0.0) {
+        return None;
+    }
     // Twice the weights of c, a and b times the segment's length, up to one common sign.
     let weight_c = robust::orient3d(p, q, a, b);
     let weight_a = robust::orient3d(p, q, b, c);
@@ -207,11 +240,6 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
     let highest = weight_a.max(weight_b).max(weight_c);
     // All zero: the line lies in the triangle's plane, or the triangle or the segment is degenerate.
     if (lowest < 0.0 && highest > 0.0) || (lowest == 0.0 && highest == 0.0) {
-        return None;
-    }
-    let side_p = robust::orient3d(a, b, c, p);
-    let side_q = robust::orient3d(a, b, c, q);
-    if (side_p > 0.0 && side_q > 0.0) || (side_p < 0.0 && side_q < 0.0) || (side_p == 0.0 && side_q == 0.0) {
         return None;
     }
     let sum = weight_a + weight_b + weight_c;

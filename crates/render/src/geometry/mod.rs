@@ -2,6 +2,7 @@
 
 mod bvh;
 mod intersect;
+mod wide;
 
 #[cfg(test)]
 mod tests;
