@@ -231,3 +231,22 @@ fn many_coincident_triangles_are_one() {
         assert_eq!(hits, count + count / 2);
     }
 }
+
+/// Of nested boxes only the two smallest are joined at a time: the binary tree is as deep as it has triangles. The stack need not be: 26 bytes a level.
+#[test]
+fn nested_triangles_need_no_deep_stack() {
+    const COUNT: u16 = 5000;
+    let test = || {
+        let vertices = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.3), Vec3::new(0.0, 1.0, 0.5)];
+        let nested = |i| Triangle { vertices: vertices.map(|v| v * (1.0 + f32::from(i) * 1e-3)) };
+        let triangles: Vec<_> = (0..COUNT).map(nested).collect();
+        let bvh = Bvh::new(&triangles);
+        let p = DVec3::new(0.1, 0.0, -9.0);
+        let s = Segment::new(p, p + DVec3::Z * 20.0);
+        let found = triangles.iter().filter(|t| intersect_exact(&s, t).is_some()).count();
+        let mut hits = 0;
+        bvh.visit_hits(&s, |_| hits += 1);
+        assert!(hits == found && found > 1000 && bvh.occluded(&s), "{hits} {found}");
+    };
+    std::thread::Builder::new().stack_size(128 << 10).spawn(test).unwrap().join().unwrap();
+}

@@ -262,10 +262,28 @@ impl Tree {
             p.search_depth_threshold,
         );
         ReinsertionOptimizer::default().run(&mut binary, p.reinsertion_batch_ratio, None);
-        let mut counts = vec![0; binary.nodes.len()];
-        choose_leaves(&binary, 0, &mut counts);
+        let counts = choose_leaves(&binary);
         let mut tree = Self { root: None, nodes: Vec::new(), leaves: Vec::new() };
-        tree.root = Some(tree.add(&binary, &counts, triangles, 0));
+        // Depth first, so that what is near in space is near in memory; without recursion, for the binary tree may be as deep as it has triangles.
+        let mut pending = vec![(0, None)];
+        while let Some((from, place)) = pending.pop() {
+            let child = if counts[from] != 0 {
+                let mut numbers: SmallVec<[u32; WIDTH]> = SmallVec::new();
+                collect(&binary, from, &mut numbers);
+                tree.leaves.push(leaf(triangles, &numbers));
+                Child::leaf(tree.leaves.len() - 1, numbers.len())
+            } else {
+                let index = tree.nodes.len();
+                let children = wide_children(&binary, &counts, from);
+                tree.nodes.push(node(children.iter().map(|&child| *binary.nodes[child].aabb())));
+                pending.extend(children.iter().enumerate().rev().map(|(i, &child)| (child, Some((index, i)))));
+                Child::node(index)
+            };
+            match place {
+                None => tree.root = Some(child),
+                Some((parent, i)) => tree.nodes[parent].children[i] = child,
+            }
+        }
         tree.nodes.shrink_to_fit();
         tree.leaves.shrink_to_fit();
         tree
@@ -276,39 +294,6 @@ impl Tree {
         let numbers: Vec<u32> = (0..NONE).take(triangles.len()).collect();
         let leaves = numbers.chunks(WIDTH).map(|numbers| leaf(triangles, numbers)).collect();
         Self { root: None, nodes: Vec::new(), leaves }
-    }
-
-    /// Adds what is under a binary node.
-    fn add(&mut self, binary: &Bvh2, counts: &[u32], triangles: &[Triangle], from: usize) -> Child {
-        if counts[from] != 0 {
-            let mut numbers: SmallVec<[u32; WIDTH]> = SmallVec::new();
-            collect(binary, from, &mut numbers);
-            self.leaves.push(leaf(triangles, &numbers));
-            return Child::leaf(self.leaves.len() - 1, numbers.len());
-        }
-        let first = binary.nodes[from].first_index as usize;
-        let mut children: SmallVec<[usize; CHILDREN]> = SmallVec::from_slice(&[first, first + 1]);
-        let area = |i: usize| binary.nodes[i].aabb().half_area();
-        while children.len() < CHILDREN {
-            let open = (0..children.len()).filter(|&i| counts[children[i]] == 0);
-            let Some(i) = open.max_by(|&i, &j| area(children[i]).total_cmp(&area(children[j]))) else { break };
-            let first = binary.nodes[children[i]].first_index as usize;
-            children[i] = first;
-            children.push(first + 1);
-        }
-        let index = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
-        for (i, &child) in children.iter().enumerate() {
-            let added = self.add(binary, counts, triangles, child);
-            let bounds = binary.nodes[child].aabb();
-            let node = &mut self.nodes[index];
-            for (axis, planes) in node.planes.iter_mut().enumerate() {
-                planes[0][i / WIDTH][i % WIDTH] = bounds.min[axis];
-                planes[1][i / WIDTH][i % WIDTH] = bounds.max[axis];
-            }
-            node.children[i] = added;
-        }
-        Child::node(index)
     }
 
     /// Bytes of nodes and leaves.
@@ -399,25 +384,65 @@ impl Tree {
 /// What a binary node costs a ray that comes into it, beside a leaf: a wide node takes the place of several.
 const NODE_COST: f32 = 0.5;
 
-/// Marks the binary nodes that become leaves, with the number of their triangles, where that is no dearer than to go on. Returns the number
-/// of triangles and the cost below the node.
-fn choose_leaves(binary: &Bvh2, from: usize, counts: &mut [u32]) -> (u32, f32) {
-    let node = &binary.nodes[from];
-    let area = node.aabb().half_area();
-    if node.is_leaf() {
-        counts[from] = 1;
-        return (1, area);
+/// For each binary node that becomes a leaf the number of its triangles, 0 for all others: a leaf where that is no dearer than to go on.
+fn choose_leaves(binary: &Bvh2) -> Vec<u32> {
+    // Parents first.
+    let mut order = vec![0];
+    let mut next = 0;
+    while let Some(&from) = order.get(next) {
+        let node = &binary.nodes[from];
+        if !node.is_leaf() {
+            let first = node.first_index as usize;
+            order.extend([first, first + 1]);
+        }
+        next += 1;
     }
-    let first = node.first_index as usize;
-    let (left, right) = (choose_leaves(binary, first, counts), choose_leaves(binary, first + 1, counts));
-    let count = left.0 + right.0;
-    let cost = NODE_COST * area + left.1 + right.1;
-    // A leaf costs the same with one triangle as with four.
-    if count as usize <= WIDTH && area <= cost {
-        counts[from] = count;
-        return (count, area);
+    let mut counts = vec![0; binary.nodes.len()];
+    // The number of triangles below each node, and their cost.
+    let mut below = vec![(0_u32, 0.0_f32); binary.nodes.len()];
+    for &from in order.iter().rev() {
+        let node = &binary.nodes[from];
+        let area = node.aabb().half_area();
+        let (count, cost) = if node.is_leaf() {
+            (1, 0.0)
+        } else {
+            let first = node.first_index as usize;
+            let (left, right) = (below[first], below[first + 1]);
+            (left.0 + right.0, NODE_COST * area + left.1 + right.1)
+        };
+        // A leaf costs the same with one triangle as with four.
+        let is_leaf = node.is_leaf() || count as usize <= WIDTH && area <= cost;
+        counts[from] = if is_leaf { count } else { 0 };
+        below[from] = (count, if is_leaf { area } else { cost });
     }
-    (count, cost)
+    counts
+}
+
+/// Up to eight nodes below a binary node that take its place: the largest are opened first.
+fn wide_children(binary: &Bvh2, counts: &[u32], from: usize) -> SmallVec<[usize; CHILDREN]> {
+    let first = binary.nodes[from].first_index as usize;
+    let mut children: SmallVec<[usize; CHILDREN]> = SmallVec::from_slice(&[first, first + 1]);
+    let area = |i: usize| binary.nodes[i].aabb().half_area();
+    while children.len() < CHILDREN {
+        let open = (0..children.len()).filter(|&i| counts[children[i]] == 0);
+        let Some(i) = open.max_by(|&i, &j| area(children[i]).total_cmp(&area(children[j]))) else { break };
+        let first = binary.nodes[children[i]].first_index as usize;
+        children[i] = first;
+        children.push(first + 1);
+    }
+    children
+}
+
+/// A node with these boxes, at most eight; its children are not known yet.
+fn node(boxes: impl Iterator<Item = Aabb>) -> Node {
+    let mut node = Node::EMPTY;
+    for (i, bounds) in boxes.enumerate() {
+        for (axis, planes) in node.planes.iter_mut().enumerate() {
+            planes[0][i / WIDTH][i % WIDTH] = bounds.min[axis];
+            planes[1][i / WIDTH][i % WIDTH] = bounds.max[axis];
+        }
+    }
+    node
 }
 
 /// The triangles below a binary node.
