@@ -63,9 +63,9 @@ pub(crate) struct RenderArgs {
     /// Transmittance towards emitters: exp(-tau), or the 0/1 estimate of other renderers, noisier and of the same mean
     #[arg(long, value_enum, default_value_t = TransmittanceName::Analytic)]
     pub(crate) transmittance: TransmittanceName,
-    /// Cast a ray for every free flight instead of asking for a proof first (volpath); the image is the same
+    /// Ask for a proof of each free flight before a ray is cast for it (volpath); the image is the same
     #[arg(long)]
-    pub(crate) no_segment_first: bool,
+    pub(crate) segment_first: bool,
     /// Samples per pixel [default: the scene's]
     #[arg(long, value_name = "N")]
     pub(crate) spp: Option<u32>,

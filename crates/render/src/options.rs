@@ -60,7 +60,8 @@ pub struct RenderOptions {
     pub threads: Option<usize>,
     /// Part of the full film to render; by default the scene's.
     pub crop: Option<PixelRect>,
-    /// Whether `volpath` asks for a proof of each free flight before it casts a ray (Sec. 2.4). The image is the same either way.
+    /// Whether `volpath` asks for a proof of each free flight before it casts a ray (Sec. 2.4). The image is the same either way; it has seldom
+    /// paid (`docs/performance.md`).
     pub segment_first: bool,
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
@@ -78,7 +79,7 @@ impl Default for RenderOptions {
             seed: None,
             threads: None,
             crop: None,
-            segment_first: true,
+            segment_first: false,
             max_voxels: 1 << 29,
         }
     }

@@ -101,7 +101,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         seed: args.seed,
         threads: args.threads,
         crop: args.crop,
-        segment_first: !args.no_segment_first,
+        segment_first: args.segment_first,
         ..RenderOptions::default()
     })
 }

@@ -63,6 +63,18 @@ fn method_by_default() {
 }
 
 #[test]
+fn flights_are_asked_for_on_demand() {
+    let sandbox = Sandbox::new();
+    let flights = |option: &[&str]| {
+        sandbox.render(&[&["--stats", "fog.json"], option].concat());
+        let json: serde_json::Value = serde_json::from_slice(&sandbox.read("fog.json")).unwrap();
+        json["flights"].as_u64().unwrap()
+    };
+    assert_eq!(flights(&[]), 0);
+    assert!(flights(&["--segment-first"]) > 100);
+}
+
+#[test]
 fn statistics_of_the_plain_method() {
     let sandbox = Sandbox::new();
     sandbox.render(&["--method", "none", "--stats", "fog.json"]);

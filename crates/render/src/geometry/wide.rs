@@ -381,8 +381,9 @@ impl Tree {
     }
 }
 
-/// What a binary node costs a ray that comes into it, beside a leaf: a wide node takes the place of several.
-const NODE_COST: f32 = 0.5;
+/// What a binary node costs a ray that comes into it, beside a leaf: a wide node takes the place of several. With more, two walls of a room
+/// become one leaf whose box is the room (`docs/performance.md`).
+const NODE_COST: f32 = 0.3;
 
 /// For each binary node that becomes a leaf the number of its triangles, 0 for all others: a leaf where that is no dearer than to go on.
 fn choose_leaves(binary: &Bvh2) -> Vec<u32> {
