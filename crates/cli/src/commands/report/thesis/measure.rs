@@ -43,7 +43,7 @@ pub(super) struct SettingResult {
     /// N, scaled.
     pub(super) n: f64,
     pub(super) p_sp: f64,
-    /// `T_render` and `T_query` of the hierarchy alone in seconds, scaled.
+    /// `T_render` (median of several) and `T_query` of the hierarchy alone in seconds, scaled.
     pub(super) t_render: f64,
     pub(super) t_query: f64,
     /// On all threads.
@@ -96,6 +96,12 @@ pub(super) struct MeasuredResult<'a> {
 struct Ready {
     scene: Scene,
     world: World,
+}
+
+/// `T_render` of the hierarchy alone, measured between the methods, on one thread and on all.
+struct Turns {
+    one: Vec<f64>,
+    all: Vec<f64>,
 }
 
 /// What was built on one thread and on all, the same but for the time it took.
@@ -238,9 +244,7 @@ impl Bench<'_> {
             let replay = self.replay(&ready, &stream, self.methods, &sizes, 5)?;
             self.done();
             self.step(scene.name, "none");
-            let built = self.build(&ready, &options)?;
-            let (image, s) = self.render(&ready, &built, &options)?;
-            let threaded = self.threaded(&ready, &built, &options, &image)?;
+            let (image, s) = self.render(&ready, &self.build(&ready, &options)?, &options)?;
             self.done();
             let (n, p_sp) = (self.scale() * s.queries as f64, s.p_spatial.unwrap_or(0.0));
             settings.push(SettingResult {
@@ -249,14 +253,25 @@ impl Bench<'_> {
                 p_sp,
                 t_render: self.scale() * s.t_render,
                 t_query: total(n, p_sp, &replay, replay.hierarchy.t_spatial.median),
-                threaded,
+                threaded: None,
                 replay,
                 methods: vec![],
             });
             images.push(image);
         }
+        // The hierarchy alone takes turns with the methods, which are compared with it.
+        let alone = self.build(&ready, &self.options(Method::None, 1.0, None, SPP))?;
+        let mut turns: Vec<Turns> = settings.iter().map(|s| Turns { one: vec![s.t_render], all: vec![] }).collect();
         for &size in &sizes {
-            for &method in self.methods {
+            for (k, &method) in self.methods.iter().enumerate() {
+                if k % 4 == 0 {
+                    self.step(scene.name, &format!("none {size}"));
+                    for ((setting, image), turns) in settings.iter().zip(&images).zip(&mut turns) {
+                        let options = self.options(Method::None, 1.0, setting.samples, SPP);
+                        turns.one.push(self.scale() * self.render(&ready, &alone, &options)?.1.t_render);
+                        turns.all.extend(self.threaded(&ready, &alone, &options, image)?.map(|all| all.t_render));
+                    }
+                }
                 self.step(scene.name, &format!("{method} {size}"));
                 let options = self.options(method, size, None, SPP);
                 let built = self.build(&ready, &options)?;
@@ -268,6 +283,11 @@ impl Bench<'_> {
                     self.done();
                 }
             }
+        }
+        for (setting, turns) in settings.iter_mut().zip(&turns) {
+            setting.t_render = median(&turns.one);
+            let all = || Threaded { t_build: 0.0, t_render: median(&turns.all) };
+            setting.threaded = (!turns.all.is_empty()).then(all);
         }
         let picture = picture(scene.name, images.last())?;
         Ok(SceneResult { name: scene.name, picture, settings })
