@@ -48,7 +48,8 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
     /// Acceleration of visibility queries: none, or a field ndf, amr, dsz or dual, each alone or with -sn or -xsn;
-    /// the image is the same with all [default: amr-xsn, or none in a scene without point and area lights]
+    /// the image is the same with all [default: amr-xsn, or none in a scene without point and area lights and without
+    /// --segment-first]
     #[arg(long, value_name = "METHOD")]
     pub(crate) method: Option<Method>,
     /// Side of a voxel in world units [default: a 128th of the scene's longest side]

@@ -25,7 +25,9 @@ use crate::{
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let mut options = options(args)?;
     let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
-    options.method = args.method.unwrap_or_else(|| Method::for_lights(&scene.light_shapes()));
+    // Who asks for proofs of flights wants a method, whatever the lights.
+    let default = || if args.segment_first { Method::default() } else { Method::for_lights(&scene.light_shapes()) };
+    options.method = args.method.unwrap_or_else(default);
     options.validate(&scene)?;
     let output = output(args, &name)?;
     for warning in &scene.warnings {

@@ -47,6 +47,8 @@ fn generated_scene_in_another_size() {
     // Its light is the sky: no method would pay.
     let text = sandbox.render(&["a/scape.xml", "-o", "fog.exr"]).stdout;
     assert!(text.contains("method         none\n"), "{text}");
+    let text = sandbox.render(&["a/scape.xml", "-o", "fog.exr", "--segment-first"]).stdout;
+    assert!(text.contains("method         amr-xsn"), "{text}");
 }
 
 #[test]
