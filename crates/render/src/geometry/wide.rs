@@ -8,7 +8,7 @@
 //!
 //! *Cost:* a node is four cache lines, a leaf two and a half.
 //!
-//! *Limits:* 2²⁹ triangles; over more there are no nodes, and all triangles are tested.
+//! *Limits:* 2²⁹ triangles; over more, and up to 2³² − 1, there are no nodes, and all triangles are tested.
 
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use obvhs::{
@@ -153,8 +153,8 @@ impl TreeRay {
     }
 }
 
-/// Scales are powers of two up to 2¹⁵⁰; a leaf's test uses none that single precision does not have. With a smaller scale its
-/// coordinates are only smaller, and its error bound with them too large.
+/// Scales are powers of two up to 2¹⁵⁰; a leaf's test uses none above 2¹²⁶, so that the spacing of the smallest
+/// numbers, 2⁻¹⁴⁹, stays a rounding of 1 there. Its coordinates are then only smaller, and its error bound with them too large.
 const LARGEST_SCALE: f64 = 8.507_059_173_023_462e37;
 
 impl Node {
@@ -190,7 +190,7 @@ impl Leaf {
     /// doubled, 4; the shear's factor is rounded by 1, times 2, its product by 2; the last difference, at most 4, by 4. So a sheared coordinate errs by
     /// δ = 30u ([`SHEAR_ERROR`] is 32u). With L the largest of them that was computed, at most 4 + δ, an edge function cx·by − cy·bx errs by at most
     /// 4δL + 2δ² and by the rounding of two products and a difference, 4uL² < 17uL < δL. So 8δ(L + δ) is more than enough: the rest is for its own
-    /// rounding, and for 8u of δ more where the scale is so small that the shear's factor loses bits.
+    /// rounding, and for 8u of δ more where the scale is so small that the shear's factor loses bits (8·38u < 8·2·32u).
     ///
     /// Where world coordinates overflow nothing is rejected: a vertex with NaN leaves only one edge function that is a number, and with infinity
     /// alone the bound is infinite.
@@ -321,14 +321,16 @@ impl Tree {
     ) {
         let Some(mut next) = self.root else {
             for (triangle, number) in self.all() {
-                if let Some(hit) = test.intersect(&triangle) {
-                    visit(hit, number);
+                if let Some(hit) = test.intersect(&triangle)
+                    && visit(hit, number) == f32::NEG_INFINITY
+                {
+                    return;
                 }
             }
             return;
         };
         let mut ray = TreeRay::new(start, test, scale);
-        // Seven of a node's children wait at most, and hardly ever more than two: no tree but one of coincident triangles makes this allocate.
+        // Seven of a node's children wait at most, and hardly ever more than two: only trees deeper than nine levels can make this allocate.
         let mut waiting: SmallVec<[(Child, f32); 64]> = SmallVec::new();
         loop {
             if next.triangles() == 0 {

@@ -268,7 +268,9 @@ impl Bench<'_> {
                     self.step(scene.name, &format!("none {size}"));
                     for ((setting, image), turns) in settings.iter().zip(&images).zip(&mut turns) {
                         let options = self.options(Method::None, 1.0, setting.samples, SPP);
-                        turns.one.push(self.scale() * self.render(&ready, &alone, &options)?.1.t_render);
+                        let (again, s) = self.render(&ready, &alone, &options)?;
+                        same(&again, image, &options)?;
+                        turns.one.push(self.scale() * s.t_render);
                         turns.all.extend(self.threaded(&ready, &alone, &options, image)?.map(|all| all.t_render));
                     }
                 }

@@ -240,6 +240,7 @@ impl Tables<'_> {
                     format!("T_render and T_build are for one thread, those of *all* for {} threads.", self.threads)
                 })
                 .into_iter()
+                .chain([NOISE.to_owned()])
                 .collect(),
             tables: tables.collect(),
             ..Section::default()
@@ -407,6 +408,10 @@ impl Tables<'_> {
         }
     }
 }
+
+/// Of Tables 6.5 to 6.10.
+const NOISE: &str = "T_render of none is the median of renders between those of the methods; that of a method is one render, or the median of several where it is \
+                     short, with the noise of the machine.";
 
 fn about(
     table: &'static str,
