@@ -3,6 +3,7 @@
 //! A report makes [`Figure`]s, from which CSV and JSON follow, and a [`Page`] of tables and plots, from which the words on stdout and
 //! the HTML follow.
 
+mod bench;
 mod convergence;
 mod figures;
 mod page;

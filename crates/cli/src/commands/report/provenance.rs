@@ -1,9 +1,11 @@
 //! Where a report's figures come from: machine, program, command.
 
-use std::{env, thread};
+use std::env;
 
 use serde::Serialize;
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
+
+use super::bench::processors;
 
 /// What one has to know to repeat a measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -42,7 +44,7 @@ impl Provenance {
             profile: option_env!("VDF_PROFILE").unwrap_or("unknown"),
             rustc: option_env!("VDF_RUSTC").unwrap_or("unknown"),
             cpu: cpu.unwrap_or_else(|| env::consts::ARCH.to_owned()),
-            cores: thread::available_parallelism().map_or(1, usize::from),
+            cores: processors(),
             os: System::long_os_version().unwrap_or_else(|_| env::consts::OS.to_owned()),
         }
     }

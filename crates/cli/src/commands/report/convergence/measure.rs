@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use rayon::ThreadPool;
 use vdf_render::{
     Acceleration, BuildReport, Image, IntegratorKind, Method, Prepared, Progress, RenderError, RenderOptions, World,
@@ -16,7 +16,10 @@ use super::{
     reference::{Reference, SEEDS, telling_pixels},
 };
 use crate::{
-    commands::report::queries::integrator_name,
+    commands::report::{
+        bench::{has_pixels, pool, same_bits},
+        queries::integrator_name,
+    },
     failure::{Failure, say},
     progress::Reporter,
 };
@@ -128,8 +131,7 @@ impl Progress for Paths<'_> {
 
 impl Bench<'_> {
     pub(super) fn measure(&self) -> Result<Measured, Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.plan.threads.unwrap_or(0)).build();
-        let pool = pool.context("cannot start the threads").map_err(Failure::Work)?;
+        let pool = pool(self.plan.threads)?;
         let references = self.references(&pool)?;
         let Plan { methods, settings, spps, seeds, .. } = self.plan;
         let none = || vec![Vec::with_capacity(seeds.len()); methods.len()];
@@ -310,48 +312,11 @@ fn reference_of(references: &[Reference], setting: Setting) -> Result<usize, Fai
     found.ok_or_else(|| Failure::Work(anyhow!("{setting} has no reference")))
 }
 
-/// Whether the images are the same, bit for bit.
-fn same_bits(a: &Image, b: &Image) -> bool {
-    (a.width, a.height, a.origin) == (b.width, b.height, b.origin) && has_pixels(a, b)
-}
-
-/// Whether the pixels of a part of the film are the same in the image, bit for bit.
-fn has_pixels(image: &Image, part: &Image) -> bool {
-    let offset = |i: usize| usize::try_from(i64::from(part.origin[i]) - i64::from(image.origin[i])).ok();
-    let (Some(dx), Some(dy)) = (offset(0), offset(1)) else { return false };
-    let (width, part_width) = (image.width as usize, part.width as usize);
-    let bits = |p: &vdf_render::Rgb| p.to_array().map(f32::to_bits);
-    part.pixels.chunks(part_width.max(1)).enumerate().all(|(y, row)| {
-        let first = (y + dy) * width + dx;
-        let there = image.pixels.get(first..first + row.len()).unwrap_or_default();
-        dx + part_width <= width && row.iter().map(bits).eq(there.iter().map(bits))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use vdf_render::Rgb;
 
     use super::*;
-
-    #[test]
-    fn images_are_compared_bit_by_bit() {
-        let mut a = Image::new(4, 3);
-        for (i, p) in a.pixels.iter_mut().enumerate() {
-            *p = Rgb::splat(i as f32);
-        }
-        assert!(same_bits(&a, &a.clone()));
-        for (at, value) in [(0, -0.0), (5, 5.000_001), (11, f32::NAN)] {
-            let mut b = a.clone();
-            b.pixels[at].z = value;
-            assert!(!same_bits(&a, &b) && !same_bits(&b, &a), "{at}");
-        }
-        assert!(!same_bits(&a, &Image::new(3, 4)));
-        let mut shorter = a.clone();
-        shorter.height = 2;
-        shorter.pixels.truncate(8);
-        assert!(!same_bits(&a, &shorter) && !same_bits(&shorter, &a));
-    }
 
     #[test]
     fn a_part_lies_where_it_lies() {

@@ -13,7 +13,7 @@ use vdf_render::{
     scene::{LoadOptions, Scene, SceneSource, builtin},
 };
 
-use super::Settings;
+use super::{super::bench::same_bits, Settings};
 use crate::{
     failure::Failure,
     progress::{Part, Reporter},
@@ -40,12 +40,6 @@ pub(super) struct Built {
     pub(super) method: Method,
     pub(super) acceleration: Acceleration,
     pub(super) report: BuildReport,
-}
-
-/// A pool of so many threads, one for each processor by default.
-pub(super) fn pool(threads: Option<usize>) -> Result<ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-    pool.map_err(|e| RenderError::Threads { message: e.to_string() }.into())
 }
 
 /// The method of that name.
@@ -181,7 +175,7 @@ impl Lab<'_> {
                 };
                 let rendering = render_prepared(&ready.scene, &prepared, &options, &Part(self.reporter))?;
                 let expected = expected.get_or_insert_with(|| rendering.image.clone());
-                if !same(expected, &rendering.image) {
+                if !same_bits(expected, &rendering.image) {
                     let (method, threads) = (built.method, rendering.statistics.threads);
                     return Err(Failure::Work(anyhow!(
                         "WRONG IMAGE: with {method} on {threads} threads it differs from the first. Please report it with this command"
@@ -193,12 +187,6 @@ impl Lab<'_> {
         }
         Ok(results.into_iter().filter_map(|(seconds, last)| Some((seconds, last?))).collect())
     }
-}
-
-/// Bit by bit.
-fn same(a: &Image, b: &Image) -> bool {
-    let bits = |image: &Image| image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
-    (a.width, a.height) == (b.width, b.height) && bits(a) == bits(b)
 }
 
 /// The reports of repeated builds, by method.
@@ -241,26 +229,5 @@ impl Builds {
 
     fn of(&self, method: Method) -> impl Iterator<Item = &BuildReport> {
         self.0.iter().filter(move |(m, _)| *m == method).flat_map(|(_, reports)| reports)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use vdf_render::Rgb;
-
-    use super::*;
-
-    #[test]
-    fn images_are_compared_bit_by_bit() {
-        let mut image = Image::new(3, 2);
-        image.pixels.fill(Rgb::new(0.0, 1.0, 0.1));
-        assert!(same(&image, &image.clone()));
-        for (pixel, value) in [(0, Rgb::new(-0.0, 1.0, 0.1)), (5, Rgb::new(0.0, 1.0, 0.1_f32.next_up()))] {
-            let mut other = image.clone();
-            other.pixels[pixel] = value;
-            assert!(!same(&image, &other));
-        }
-        let other = Image { pixels: image.pixels.clone(), ..Image::new(2, 3) };
-        assert!(!same(&image, &other));
     }
 }

@@ -16,7 +16,13 @@ use anyhow::anyhow;
 use vdf_render::Progress as _;
 
 use self::{measure::Lab, sweep::Sweep};
-use super::{grid, page::Page, provenance::Provenance, queries::integrator_name};
+use super::{
+    bench::{MOST_THREADS, pool, processors},
+    grid,
+    page::Page,
+    provenance::Provenance,
+    queries::integrator_name,
+};
 use crate::{args::ReportScalingArgs, failure::Failure, progress::Reporter};
 
 /// How far and how often it is measured.
@@ -43,12 +49,12 @@ impl Settings {
     fn new(args: &ReportScalingArgs) -> Result<Self, Failure> {
         let quick = args.quick;
         let either = |full, small| if quick { small } else { full };
-        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let processors = processors();
         let settings = Self {
             max_triangles: args.max_triangles.unwrap_or(if quick { 400_000 } else { 1_000_000 }),
             max_voxels_per_side: args.max_voxels_per_side.unwrap_or(either(256, 128)),
             max_lights: args.max_lights.unwrap_or(either(64, 16)),
-            max_threads: args.max_threads.unwrap_or(processors.min(threads::MOST)),
+            max_threads: args.max_threads.unwrap_or(processors.min(MOST_THREADS)),
             repetitions: args.repetitions.unwrap_or(either(5, 3)),
             size: args.size.unwrap_or(either(128, 48)),
             spp: either(16, 4),
@@ -61,7 +67,7 @@ impl Settings {
             ("max-triangles", settings.max_triangles, triangles::LEAST, triangles::MOST),
             ("max-voxels-per-side", settings.max_voxels_per_side.into(), voxels::LEAST.into(), voxels::MOST.into()),
             ("max-lights", settings.max_lights.into(), 1, lights::MOST.into()),
-            ("max-threads", settings.max_threads as u64, 1, threads::MOST as u64),
+            ("max-threads", settings.max_threads as u64, 1, MOST_THREADS as u64),
             ("repetitions", settings.repetitions.into(), 1, 1000),
             ("size", settings.size.into(), 1, 4096),
         ];
@@ -70,10 +76,10 @@ impl Settings {
                 return Err(Failure::Usage(anyhow!("--{option} must be from {least} to {most}, not {value}")));
             }
         }
-        if settings.threads.is_some_and(|n| !(1..=threads::MOST).contains(&n)) {
+        if settings.threads.is_some_and(|n| !(1..=MOST_THREADS).contains(&n)) {
             return Err(Failure::Usage(anyhow!(
                 "--threads must be from 1 to {}, not {}",
-                threads::MOST,
+                MOST_THREADS,
                 settings.threads.unwrap_or(0)
             )));
         }
@@ -85,7 +91,7 @@ pub(crate) fn run(args: &ReportScalingArgs) -> Result<(), Failure> {
     let settings = Settings::new(args)?;
     args.files.check()?;
     let reporter = Reporter::new(args.files.quiet)?;
-    let lab = Lab { reporter: &reporter, settings: &settings, pool: measure::pool(settings.threads)? };
+    let lab = Lab { reporter: &reporter, settings: &settings, pool: pool(settings.threads)? };
     let result = sweeps(&lab, &args.only);
     reporter.finish();
     let sweeps = result?;

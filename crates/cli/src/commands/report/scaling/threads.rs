@@ -4,14 +4,13 @@ use anyhow::anyhow;
 use vdf_render::Method;
 
 use super::{
-    measure::{Lab, Phase, method, pool},
+    super::bench::pool,
+    measure::{Lab, Phase, method},
     sweep::{Group, Sweep, Unit, halvings},
 };
 use crate::failure::Failure;
 
 const SCENE: &str = "san-miguel";
-
-pub(super) const MOST: usize = 1024;
 
 /// Every number up to eight, then by doubling.
 pub(super) fn sizes(most: usize) -> Vec<usize> {

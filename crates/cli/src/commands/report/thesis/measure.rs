@@ -1,6 +1,6 @@
 //! The measurements behind the tables.
 
-use anyhow::{Context as _, anyhow};
+use anyhow::anyhow;
 use vdf_render::{
     Acceleration, BuildReport, Image, IntegratorKind, Method, Prepared, Progress as _, RenderOptions, Statistics,
     World, encode_png,
@@ -14,7 +14,11 @@ use super::{
     data::{Measured, Repeated},
 };
 use crate::{
-    commands::report::{page::Picture, queries::integrator_name},
+    commands::report::{
+        bench::{pool, same_bits},
+        page::Picture,
+        queries::integrator_name,
+    },
     failure::Failure,
     progress::{Part, Reporter},
 };
@@ -172,8 +176,7 @@ impl Bench<'_> {
     }
 
     fn build(&self, ready: &Ready, options: &RenderOptions) -> Result<(Acceleration, BuildReport), Failure> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads.unwrap_or(0)).build();
-        let pool = pool.context("cannot start threads").map_err(Failure::Work)?;
+        let pool = pool(options.threads)?;
         let size = options.voxel_size.unwrap_or(1.0);
         let Ready { scene, world } = ready;
         let build = || {
@@ -397,8 +400,7 @@ impl Bench<'_> {
 
 /// Fails unless the images are the same bit by bit.
 fn same(image: &Image, expected: &Image, options: &RenderOptions) -> Result<(), Failure> {
-    let bits = |image: &Image| image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect::<Vec<_>>();
-    if bits(image) == bits(expected) {
+    if same_bits(image, expected) {
         return Ok(());
     }
     let (size, threads) = (options.voxel_size.unwrap_or(1.0), options.threads.unwrap_or(0));

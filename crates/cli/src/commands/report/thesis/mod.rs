@@ -11,7 +11,12 @@ use anyhow::anyhow;
 use vdf_render::Progress as _;
 
 use self::{data::ThesisData, measure::Bench};
-use super::{methods, page::Page, provenance::Provenance};
+use super::{
+    bench::{MOST_THREADS, processors},
+    methods,
+    page::Page,
+    provenance::Provenance,
+};
 use crate::{args::ReportThesisArgs, failure::Failure, progress::Reporter};
 
 /// Side of the thesis's images in pixels. It is not printed there; its numbers of queries fit this.
@@ -35,8 +40,6 @@ const SCENES: [ThesisScene; 4] = [
 /// Samples per path segment in these tables; `None` is the path tracer.
 const SETTINGS: [Option<u32>; 4] = [Some(1), Some(7), Some(49), None];
 
-const MOST_THREADS: usize = 1024;
-
 /// Samples per pixel in these tables.
 const SPP: u32 = 4;
 
@@ -52,7 +55,7 @@ pub(crate) fn run(args: &ReportThesisArgs) -> Result<(), Failure> {
     args.files.check()?;
     let thesis = ThesisData::load().map_err(Failure::Work)?;
 
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let threads = args.threads.unwrap_or_else(processors);
     if !(1..=MOST_THREADS).contains(&threads) {
         return Err(Failure::Usage(anyhow!("--threads must be from 1 to {MOST_THREADS}, not {threads}")));
     }
