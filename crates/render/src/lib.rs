@@ -1,61 +1,63 @@
-//! The renderer of `vdf`: scenes, media, visibility and integrators.
+//! Light transport in participating media: media, lights, integrators, and the render that brings them together.
 //!
-//! The way of the data: [`scene`] (a file, resolved and checked) → [`World`] (hierarchy, media, emitters) → [`Acceleration`] (voxels,
-//! distance field, safe neighbourhoods: the proofs) → an integrator, tile by tile → an image and its statistics.
+//! The way of the data: a [`vdf_scene::Scene`] becomes a [`PreparedScene`] (hierarchy, media, emitters, and the provers of a method), which
+//! an [`Integrator`] renders tile by tile to an image and its [`Statistics`].
+//!
+//! ```
+//! use vdf_render::{PrepareOptions, PreparedScene, Quiet, RenderOptions};
+//! use vdf_scene::{EmbeddedFile, LoadOptions, Scene, SceneSource};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let text = r#"<scene version="3.0.0">
+//!     <integrator type="volpath"/>
+//!     <sensor type="perspective">
+//!         <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film>
+//!     </sensor>
+//!     <emitter type="constant"/>
+//! </scene>"#;
+//! let file = EmbeddedFile { path: "sky.xml".into(), text: text.into() };
+//! let scene = Scene::from_source(&SceneSource::embedded(file, vec![]), &LoadOptions::default())?;
+//! let prepared = PreparedScene::new(scene, &PrepareOptions::default(), &Quiet)?;
+//! let rendering = prepared.render(&RenderOptions::default(), &Quiet)?;
+//! assert!(rendering.image.pixels.iter().all(|&p| p == vdf_scene::Rgb::ONE));
+//! # Ok(())
+//! # }
+//! ```
 
-mod acceleration;
-mod area_light;
-mod atomic_file;
+mod bsdf;
+mod camera;
 #[cfg(test)]
 mod chi_squared;
 mod error;
+mod film;
 mod frame;
-pub mod geometry;
-mod image;
-mod image_io;
 mod integrator;
+mod job;
 mod lights;
 mod media;
-mod mesh;
-mod method;
-pub mod metrics;
 mod options;
 mod phase;
-pub mod queries;
+mod prepared;
+mod progress;
 mod render;
 mod sampler;
-pub mod scene;
-mod sensor;
-mod srgb;
 mod statistics;
-pub mod verify;
-mod visibility;
-mod voxels;
+mod threads;
 mod world;
 
-pub use acceleration::{Acceleration, BuildReport, FieldAcceleration, LightShape, ProofsVisitor};
-pub use area_light::AreaNeighbourhood;
-pub use atomic_file::{PersistError, StagedFile, check_writable, write_atomically};
+pub use camera::Camera;
 pub use error::RenderError;
-pub use image::Image;
-pub use image_io::{
-    AttributeValue, ImageError, ImageFormat, encode_png, read_exr, read_image, stage_exr, stage_png, write_exr,
-    write_png,
-};
+pub use film::sample_filter;
+pub use integrator::{Integrator, UnknownIntegrator};
+pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};
-pub use media::{Flight, Media, Way};
-pub use mesh::Triangle;
-pub use method::{FieldKind, Method, NeighbourhoodKind, UnknownMethod};
-pub use options::{IntegratorKind, Progress, RenderOptions, TransmittanceEstimator, default_voxel_size};
-pub use render::{Prepared, Rendering, render, render_prepared};
+pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals};
+pub use options::{PrepareOptions, RenderOptions, TransmittanceEstimator, check_voxel_size};
+pub use phase::PhaseFunction;
+pub use prepared::{PreparedScene, default_voxel_size};
+pub use progress::{Progress, Quiet};
+pub use render::Rendering;
 pub use sampler::Sampler;
-pub use statistics::{NeighbourhoodSize, Statistics};
-pub use visibility::{
-    Answer, Counters, FieldProofs, NeighbourhoodProofs, NoProofs, NoRecorder, Proofs, QueryKind, Recorder, ShadowQuery,
-    Visibility,
-};
-pub use voxels::SceneVoxels;
-pub use world::{SurfacePoint, World};
-
-/// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.
-pub type Rgb = glam::Vec3;
+pub use statistics::{NeighbourhoodSize, PartSize, Statistics};
+pub use threads::{check_threads, on_threads};
+pub use world::{SurfacePoint, World, light_shapes};

@@ -7,19 +7,25 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use crate::{
-    frame::{direction_about, sample_sphere_about},
-    scene::Phase,
-};
+use vdf_scene::Phase;
 
-impl Phase {
+use crate::frame::{direction_about, sample_sphere_about};
+
+/// What a phase function does in a render.
+pub trait PhaseFunction {
     /// The density per steradian of scattering from propagation direction `from` into `to`; also the density with which
-    /// [`Phase::sample_direction`] draws `to`. Both are unit vectors up to rounding.
+    /// [`PhaseFunction::sample_direction`] draws `to`. Both are unit vectors up to rounding.
     ///
     /// Relative error: below 40·2⁻⁵³ for every g and angle, as `docs/numerics.md` derives.
+    fn pdf_direction(&self, from: DVec3, to: DVec3) -> f64;
+
+    /// A direction drawn with [`PhaseFunction::pdf_direction`] from two uniform numbers in [0, 1).
+    fn sample_direction(&self, from: DVec3, u: [f64; 2]) -> DVec3;
+}
+
+impl PhaseFunction for Phase {
     #[inline]
-    #[must_use]
-    pub fn pdf_direction(&self, from: DVec3, to: DVec3) -> f64 {
+    fn pdf_direction(&self, from: DVec3, to: DVec3) -> f64 {
         match *self {
             Self::Isotropic => 0.25 / PI,
             Self::HenyeyGreenstein { g } => {
@@ -32,10 +38,8 @@ impl Phase {
         }
     }
 
-    /// A direction drawn with [`Phase::pdf_direction`].
     #[inline]
-    #[must_use]
-    pub fn sample_direction(&self, from: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
+    fn sample_direction(&self, from: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
         match *self {
             Self::Isotropic => sample_sphere_about(from, [u0, u1]),
             Self::HenyeyGreenstein { g } => {

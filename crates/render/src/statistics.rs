@@ -3,8 +3,9 @@
 use std::fmt;
 
 use serde::Serialize;
+use vdf_visibility::Counters;
 
-use crate::{BuildReport, Counters, IntegratorKind, RenderOptions, scene::Scene};
+use crate::Job;
 
 /// All figures of one render. Times in seconds, sizes in bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -19,20 +20,10 @@ pub struct Statistics {
     pub grid: Option<[u32; 3]>,
     /// Share of the voxels that are free.
     pub free_share: Option<f64>,
-    /// Bytes of the occupancy bits.
-    pub bytes_occupancy: usize,
-    /// Bytes of the distance field.
-    pub bytes_field: usize,
-    /// Bytes of all neighbourhoods.
-    pub bytes_neighbourhoods: usize,
+    /// What was built for the method, in this order.
+    pub build: Vec<PartSize>,
     /// Time to build the hierarchy and prepare the scene.
     pub t_hierarchy: f64,
-    /// Time to voxelize.
-    pub t_voxelize: f64,
-    /// Time to build the distance field.
-    pub t_field: f64,
-    /// Time to build the neighbourhoods.
-    pub t_neighbourhoods: f64,
     /// `T_build`, what the method costs before the first query: voxels, field and neighbourhoods (Sec. 2.6 in \[Houska2013\]).
     pub t_build: f64,
     /// `T_render` without `T_build`.
@@ -96,18 +87,15 @@ pub struct NeighbourhoodSize {
     pub share_of_free: f64,
 }
 
-/// What happened in a render, as its parts report it.
-pub(crate) struct Record<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) options: &'a RenderOptions,
-    pub(crate) build: &'a BuildReport,
-    pub(crate) counters: &'a Counters,
-    pub(crate) t_hierarchy: f64,
-    pub(crate) t_render: f64,
-    pub(crate) size: [u32; 2],
-    pub(crate) spp: u32,
-    pub(crate) seed: u64,
-    pub(crate) triangles: usize,
+/// A structure that a method built.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PartSize {
+    /// What it is.
+    pub name: &'static str,
+    /// Its memory in bytes.
+    pub bytes: usize,
+    /// How long it took, in seconds.
+    pub seconds: f64,
 }
 
 fn ratio(a: u64, b: u64) -> Option<f64> {
@@ -115,64 +103,52 @@ fn ratio(a: u64, b: u64) -> Option<f64> {
 }
 
 impl Statistics {
-    pub(crate) fn new(r: &Record<'_>) -> Self {
-        let free = r.build.voxels - r.build.occupied;
-        let [t_voxelize, t_field, t_neighbourhoods] = r.build.seconds;
-        let [bytes_occupancy, bytes_field, bytes_neighbourhoods] = r.build.bytes;
-        let (integrator, samples_per_segment) = match r.options.integrator {
-            IntegratorKind::Volpath => ("volpath", None),
-            IntegratorKind::Raymarch { samples_per_segment } => ("raymarch", Some(samples_per_segment)),
+    pub(crate) fn new(job: &Job<'_>, counters: &Counters, t_render: f64) -> Self {
+        let (prepared, options) = (job.prepared(), job.options());
+        let build = prepared.build_report();
+        let free = build.voxels - build.occupied;
+        let neighbourhood = |voxels: usize| NeighbourhoodSize {
+            voxels,
+            share_of_free: ratio(voxels as u64, free as u64).unwrap_or(0.0),
         };
-        debug_assert_eq!(r.build.neighbourhoods.len(), r.scene.emitters.len(), "one entry for each emitter");
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            method: r.options.method.name(),
-            voxel_size: r.build.resolution.map(|_| r.build.voxel_size),
-            grid: r.build.resolution,
-            free_share: ratio(free as u64, r.build.voxels as u64),
-            bytes_occupancy,
-            bytes_field,
-            bytes_neighbourhoods,
-            t_hierarchy: r.t_hierarchy,
-            t_voxelize,
-            t_field,
-            t_neighbourhoods,
-            t_build: t_voxelize + t_field + t_neighbourhoods,
-            t_render: r.t_render,
-            integrator,
-            samples_per_segment,
-            transmittance: r.options.transmittance.name(),
-            size: r.size,
-            spp: r.spp,
-            seed: r.seed,
-            threads: rayon::current_num_threads(),
-            triangles: r.triangles,
-            paths: r.counters.paths,
-            queries: r.counters.queries,
-            spatial: r.counters.spatial,
-            proved: r.counters.proved,
-            p_spatial: ratio(r.counters.spatial, r.counters.queries),
-            p_accelerated_given_spatial: ratio(r.counters.proved, r.counters.spatial),
-            unknown_fraction: ratio(r.counters.spatial - r.counters.proved, r.counters.spatial),
-            on_light: r.counters.on_light,
-            on_light_proved: r.counters.on_light_proved,
-            p_accelerated_on_light: ratio(r.counters.on_light_proved, r.counters.on_light),
-            rays: r.counters.rays,
-            flights: r.counters.flights,
-            flights_proved: r.counters.flights_proved,
-            p_accelerated_flights: ratio(r.counters.flights_proved, r.counters.flights),
-            neighbourhoods: r
-                .build
-                .neighbourhoods
+            method: prepared.method().name(),
+            voxel_size: build.resolution.map(|_| build.voxel_size),
+            grid: build.resolution,
+            free_share: ratio(free as u64, build.voxels as u64),
+            build: build
+                .parts
                 .iter()
-                .map(|n| {
-                    n.map(|voxels| NeighbourhoodSize {
-                        voxels,
-                        share_of_free: ratio(voxels as u64, free as u64).unwrap_or(0.0),
-                    })
-                })
+                .map(|p| PartSize { name: p.name, bytes: p.bytes, seconds: p.seconds })
                 .collect(),
-            refused: r.counters.refused,
+            t_hierarchy: prepared.t_hierarchy(),
+            t_build: build.seconds(),
+            t_render,
+            integrator: options.integrator.name(),
+            samples_per_segment: options.integrator.samples_per_segment(),
+            transmittance: options.transmittance.name(),
+            size: job.size(),
+            spp: job.spp(),
+            seed: job.seed(),
+            threads: rayon::current_num_threads(),
+            triangles: prepared.world().triangles.len(),
+            paths: counters.paths,
+            queries: counters.queries,
+            spatial: counters.spatial,
+            proved: counters.proved,
+            p_spatial: ratio(counters.spatial, counters.queries),
+            p_accelerated_given_spatial: ratio(counters.proved, counters.spatial),
+            unknown_fraction: ratio(counters.spatial - counters.proved, counters.spatial),
+            on_light: counters.on_light,
+            on_light_proved: counters.on_light_proved,
+            p_accelerated_on_light: ratio(counters.on_light_proved, counters.on_light),
+            rays: counters.rays,
+            flights: counters.flights,
+            flights_proved: counters.flights_proved,
+            p_accelerated_flights: ratio(counters.flights_proved, counters.flights),
+            neighbourhoods: build.lights.iter().map(|l| l.voxels.map(neighbourhood)).collect(),
+            refused: counters.refused,
         }
     }
 }
@@ -196,13 +172,8 @@ impl fmt::Display for Statistics {
         write!(f, "method         {}", self.method)?;
         if let (Some([x, y, z]), Some(size)) = (self.grid, self.voxel_size) {
             writeln!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;
-            writeln!(
-                f,
-                "memory         occupancy {}, field {}, neighbourhoods {}",
-                mebibytes(self.bytes_occupancy),
-                mebibytes(self.bytes_field),
-                mebibytes(self.bytes_neighbourhoods)
-            )?;
+            let sizes = self.build.iter().map(|p| format!("{} {}", p.name, mebibytes(p.bytes)));
+            writeln!(f, "memory         {}", sizes.collect::<Vec<_>>().join(", "))?;
         } else {
             writeln!(f)?;
         }
@@ -216,10 +187,12 @@ impl fmt::Display for Statistics {
                 )?;
             }
         }
+        let steps: Vec<_> = self.build.iter().map(|p| format!("{} {:.4}", p.name, p.seconds)).collect();
+        let steps = if steps.is_empty() { String::new() } else { format!(" ({})", steps.join(", ")) };
         writeln!(
             f,
-            "T_build        {:.4} s (voxels {:.4}, field {:.4}, neighbourhoods {:.4}); hierarchy {:.4} s over {} triangles",
-            self.t_build, self.t_voxelize, self.t_field, self.t_neighbourhoods, self.t_hierarchy, self.triangles
+            "T_build        {:.4} s{steps}; hierarchy {:.4} s over {} triangles",
+            self.t_build, self.t_hierarchy, self.triangles
         )?;
         writeln!(f, "T_render       {:.3} s", self.t_render)?;
         writeln!(f, "queries        N = {}, p_sp = {}", self.queries, percent(self.p_spatial))?;

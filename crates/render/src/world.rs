@@ -1,14 +1,11 @@
 //! A scene prepared for rendering: hierarchy, media, emitters and the surface behind every triangle.
 
 use glam::DVec3;
+use vdf_geometry::{Bounds, Bvh, Hit, Triangle};
+use vdf_scene::{Bsdf, Emitter, Rgb, Scene};
+use vdf_visibility::LightShape;
 
-use crate::{
-    Rgb, Triangle,
-    geometry::{Bvh, Hit},
-    lights::Lights,
-    media::Media,
-    scene::{Bsdf, Emitter, Scene},
-};
+use crate::{lights::Lights, media::Media};
 
 /// What the integrators need of a scene. Immutable and shared by all threads.
 #[derive(Debug)]
@@ -22,7 +19,7 @@ pub struct World {
     /// All occluders, surface by surface.
     pub triangles: Vec<Triangle>,
     /// Bounds of occluders, medium boundaries and point emitters: what a voxel grid has to cover.
-    pub bounds: (DVec3, DVec3),
+    pub bounds: Bounds,
     surface_of_triangle: Vec<u32>,
     surfaces: Vec<SurfaceData>,
     /// How far a ray starts from its surface: more than the rounding of a hit's position, and nothing beside a single-precision
@@ -71,12 +68,12 @@ impl World {
         }
         let bounds = bounds(scene, &triangles);
         let camera = scene.sensor.world_from_camera.w_axis.truncate();
-        let (min, max) = (bounds.0.min(camera), bounds.1.max(camera));
-        let largest = min.abs().max(max.abs()).max_element();
+        let with_camera = bounds.with(camera);
+        let largest = with_camera.largest_coordinate();
         Self {
             bvh: Bvh::new(&triangles),
             media: Media::new(&scene.media, &scene.boundaries),
-            lights: Lights::new(scene, reach(scene, (max - min).length()), largest * LIFT),
+            lights: Lights::new(scene, reach(scene, with_camera.extent().length()), largest * LIFT),
             triangles,
             bounds,
             surface_of_triangle,
@@ -112,20 +109,26 @@ impl World {
 const LIFT: f64 = 1.0 / 4_294_967_296.0;
 
 /// The box around occluders, medium boundaries and point emitters; around the camera if there are none.
-fn bounds(scene: &Scene, triangles: &[Triangle]) -> (DVec3, DVec3) {
+fn bounds(scene: &Scene, triangles: &[Triangle]) -> Bounds {
     let boundaries = scene.boundaries.iter().flat_map(|b| &b.triangles);
     let lights = scene
         .emitters
         .iter()
         .filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
-    let points = triangles.iter().chain(boundaries).flat_map(Triangle::vertices_f64).chain(lights);
-    let (min, max) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
-    if min.x <= max.x {
-        (min, max)
-    } else {
-        let camera = scene.sensor.world_from_camera.w_axis.truncate();
-        (camera, camera)
-    }
+    let bounds =
+        Bounds::of_points(triangles.iter().chain(boundaries).flat_map(Triangle::vertices_f64).chain(lights));
+    if bounds.is_empty() { Bounds::of_points([scene.sensor.world_from_camera.w_axis.truncate()]) } else { bounds }
+}
+
+/// Where the emitters of `scene` are, as far as proofs are concerned.
+#[must_use]
+pub fn light_shapes(scene: &Scene) -> Vec<LightShape<'_>> {
+    let shape = |emitter: &Emitter| match *emitter {
+        Emitter::Point { position, .. } => LightShape::Point(position),
+        Emitter::Area { surface } => LightShape::Area(&scene.surfaces[surface].triangles),
+        Emitter::Constant { .. } => LightShape::Infinite,
+    };
+    scene.emitters.iter().map(shape).collect()
 }
 
 /// A distance that leads out of the scene from anywhere in it, and, where fog is unbounded, through nearly all of it:

@@ -1,24 +1,26 @@
 //! The integrators, and what they share: next-event estimation and multiple importance sampling.
 
+mod kind;
 mod raymarch;
 mod volpath;
 
 use glam::DVec3;
+use vdf_geometry::{Hit, Segment};
+use vdf_scene::{IntegratorSettings, MediumId, Phase, Rgb};
+use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
+pub use self::kind::{Integrator, UnknownIntegrator};
 use crate::{
-    Rgb, Sampler, TransmittanceEstimator,
-    frame::sample_cosine_hemisphere,
-    geometry::{Hit, Segment},
-    scene::{IntegratorSettings, MediumId, Phase},
-    visibility::{Counters, Proofs, QueryKind, Recorder, ShadowQuery, Visibility},
+    PhaseFunction as _, Sampler, TransmittanceEstimator,
+    bsdf::{eval_diffuse, sample_diffuse},
     world::{SurfacePoint, World},
 };
 
-/// One of the integrators, bound to a scene and a method of acceleration.
+/// What the integrators work with: a scene, and who answers its visibility queries.
 #[derive(Debug)]
-pub(crate) struct Integrator<'a, P, R> {
+pub(crate) struct Tracer<'a, R> {
     pub(crate) world: &'a World,
-    pub(crate) visibility: Visibility<'a, P, R>,
+    pub(crate) visibility: Visibility<'a, R>,
     pub(crate) settings: IntegratorSettings,
     pub(crate) transmittance: TransmittanceEstimator,
 }
@@ -73,7 +75,22 @@ enum Vertex {
     OnSurface(SurfacePoint),
 }
 
-impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
+impl<R: Recorder> Tracer<'_, R> {
+    /// Radiance along `ray` by `integrator`.
+    #[inline]
+    pub(crate) fn radiance(
+        &self,
+        integrator: Integrator,
+        ray: PathRay,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
+        match integrator {
+            Integrator::Volpath => self.volpath(ray, sampler, counters),
+            Integrator::Raymarch { samples_per_segment } => self.raymarch(ray, samples_per_segment, sampler, counters),
+        }
+    }
+
     /// True if a vertex at `depth` scattering events before it may still be followed.
     #[inline]
     fn may_scatter(&self, depth: u32) -> bool {
@@ -122,7 +139,7 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
         }
         let vertex = Vertex::OnSurface(surface);
         path.radiance += path.throughput * self.direct_light(surface.point, &vertex, medium, sampler, counters);
-        let (direction, pdf) = sample_cosine_hemisphere(surface.normal, sampler.next_2d());
+        let (direction, pdf) = sample_diffuse(surface.normal, sampler.next_2d());
         path.throughput *= surface.reflectance;
         path.origin = Origin::Scattering { point: surface.point, pdf };
         path.on_surface = true;
@@ -241,10 +258,7 @@ impl Vertex {
                 let p = phase.pdf_direction(*direction, to);
                 (Rgb::splat(to_f32(p)), p)
             }
-            Self::OnSurface(s) => {
-                let pdf = s.normal.dot(to).max(0.0) / std::f64::consts::PI;
-                (s.reflectance * to_f32(pdf), pdf)
-            }
+            Self::OnSurface(s) => eval_diffuse(s.normal, s.reflectance, to),
         }
     }
 }

@@ -8,42 +8,43 @@
 //! optical depth τ is known, and 1 − T = −expm1(−τ).
 
 use glam::DVec3;
+use vdf_geometry::Segment;
+use vdf_scene::Rgb;
+use vdf_visibility::{Counters, Recorder};
 
-use super::{Integrator, Path, PathRay, Vertex, to_f32};
+use super::{Path, PathRay, Tracer, Vertex, to_f32};
 use crate::{
-    Rgb, Sampler,
-    geometry::Segment,
-    media::{Flight, Way},
-    visibility::{Counters, Proofs, Recorder},
+    Sampler,
+    media::{FreeFlight, MediumIntervals},
 };
 
-impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
+impl<R: Recorder> Tracer<'_, R> {
     /// Radiance along `ray` by ray marching with `samples` strata a segment (at least 1).
     pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
             let (hit, free) = self.cast(&path.ray, counters);
-            let way = self.world.media.way(&free, path.ray.medium);
-            let tau = way.optical_depth();
+            let intervals = self.world.media.intervals(&free, path.ray.medium);
+            let tau = intervals.optical_depth();
             if tau > 0.0 && self.may_scatter(path.depth + 1) {
-                let light = self.in_scattered(&free, &way, path.ray.direction, tau, samples, sampler, counters);
+                let light = self.in_scattered(&free, &intervals, path.ray.direction, tau, samples, sampler, counters);
                 path.radiance += path.throughput * light;
             }
             path.throughput *= to_f32((-tau).exp());
-            if !self.arrive(&mut path, hit, way.end(), sampler, counters) {
+            if !self.arrive(&mut path, hit, intervals.end(), sampler, counters) {
                 break;
             }
         }
         path.radiance
     }
 
-    /// Emitted light scattered once into the ray along `free`, which goes the way `way` of optical depth `tau`.
+    /// Emitted light scattered once into the ray along `free`, which has these intervals and the optical depth `tau`.
     #[inline]
     #[allow(clippy::too_many_arguments, reason = "what a ray has and what a path has")]
     fn in_scattered(
         &self,
         free: &Segment,
-        way: &Way<'_>,
+        intervals: &MediumIntervals<'_>,
         direction: DVec3,
         tau: f64,
         samples: u32,
@@ -55,7 +56,7 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
         for k in 0..samples {
             let depth = stratum_depth(k, width, sampler.next_1d());
             // Rounding may place the last sample an ulp beyond the end; it is worth nothing there.
-            if let Flight::Collision { t, medium } = way.fly(depth) {
+            if let FreeFlight::Collision { t, medium } = intervals.free_flight(depth) {
                 let m = self.world.media.medium(medium);
                 let vertex = Vertex::InMedium { phase: m.phase, direction };
                 sum += m.albedo * self.direct_light_alone(free.at(t), &vertex, medium, sampler, counters);

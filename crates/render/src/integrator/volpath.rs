@@ -8,15 +8,12 @@
 //! peer's 0/1 estimate; equal in the mean, less noisy.
 
 use glam::DVec3;
+use vdf_geometry::Hit;
+use vdf_scene::{MediumId, Rgb};
+use vdf_visibility::{Counters, Recorder};
 
-use super::{Integrator, Origin, Path, PathRay, Vertex, sample_free_flight};
-use crate::{
-    Rgb, Sampler,
-    geometry::Hit,
-    media::Flight,
-    scene::MediumId,
-    visibility::{Counters, Proofs, Recorder},
-};
+use super::{Origin, Path, PathRay, Tracer, Vertex, sample_free_flight};
+use crate::{PhaseFunction as _, Sampler, media::FreeFlight};
 
 /// What a ray comes to.
 enum Event {
@@ -26,13 +23,13 @@ enum Event {
     Arrival { hit: Option<Hit>, medium: Option<MediumId> },
 }
 
-impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
+impl<R: Recorder> Tracer<'_, R> {
     /// Radiance along `ray` by volumetric path tracing.
     pub(crate) fn volpath(&self, ray: PathRay, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
             let tau = sample_free_flight(sampler);
-            match self.free_flight(&path, tau, counters) {
+            match self.first_event(&path, tau, counters) {
                 Event::Collision { point, medium } => {
                     path.depth += 1;
                     if !self.may_scatter(path.depth) {
@@ -61,7 +58,7 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
 
     /// The first event on the path's ray, for a free flight of optical depth `tau`.
     #[inline]
-    fn free_flight(&self, path: &Path, tau: f64, counters: &mut Counters) -> Event {
+    fn first_event(&self, path: &Path, tau: f64, counters: &mut Counters) -> Event {
         let ray = &path.ray;
         let media = &self.world.media;
         if let Some(medium) = ray.medium
@@ -78,9 +75,9 @@ impl<P: Proofs, R: Recorder> Integrator<'_, P, R> {
         {
             return Event::Arrival { hit, medium: None };
         }
-        match media.fly(&free, ray.medium, tau) {
-            Flight::Collision { t, medium } => Event::Collision { point: free.at(t), medium },
-            Flight::Passed(medium) => Event::Arrival { hit, medium },
+        match media.free_flight(&free, ray.medium, tau) {
+            FreeFlight::Collision { t, medium } => Event::Collision { point: free.at(t), medium },
+            FreeFlight::Passed(medium) => Event::Arrival { hit, medium },
         }
     }
 }

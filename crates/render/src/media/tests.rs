@@ -1,10 +1,12 @@
 //! What is said of a box without a look at its triangles, against the walk over them: the same box with one more triangle, without area,
-//! which is met by nothing, is not taken for a shut box.
+//! which is met by nothing, is not taken for a closed box.
 
-use glam::{Vec3, dvec3, vec3};
+use glam::{DVec3, Vec3, dvec3, vec3};
+use vdf_geometry::Triangle;
+use vdf_scene::{Phase, Rgb};
 
-use super::*;
-use crate::{Rgb, Sampler, scene::Phase};
+use super::{boundaries::Extent, *};
+use crate::Sampler;
 
 const FOG: MediumId = MediumId(0);
 
@@ -35,24 +37,24 @@ fn media(triangles: Vec<Triangle>, sigma_t: f64) -> Media {
     Media::new(&[medium], &[Boundary { triangles, interior: Some(FOG), exterior: None }])
 }
 
-fn is_shut(triangles: &[Triangle]) -> bool {
-    Bounds::of(triangles).shut
+fn is_closed(triangles: &[Triangle]) -> bool {
+    Extent::of(triangles).closed_box
 }
 
 #[test]
-fn a_box_is_shut_if_nothing_is_missing() {
+fn a_box_is_closed_if_nothing_is_missing() {
     for turned in 0..64 {
         let whole = cuboid(vec3(-1.0, 2.0, 0.5), vec3(3.0, 2.5, 9.0), turned);
-        assert!(is_shut(&whole));
+        assert!(is_closed(&whole));
         let inwards: Vec<_> =
             whole.iter().map(|t| Triangle::new(t.vertices[0], t.vertices[2], t.vertices[1])).collect();
-        assert!(is_shut(&inwards));
+        assert!(is_closed(&inwards));
         for i in 0..12 {
             let changed = |f: &dyn Fn(&mut Vec<Triangle>)| {
                 let mut changed = whole.clone();
                 f(&mut changed);
-                assert!(Bounds::of(&changed).hollow || !is_shut(&changed));
-                is_shut(&changed)
+                assert!(Extent::of(&changed).shell || !is_closed(&changed));
+                is_closed(&changed)
             };
             assert!(
                 !changed(&|t| {
@@ -61,7 +63,7 @@ fn a_box_is_shut_if_nothing_is_missing() {
                 "one missing"
             );
             let but_one: Vec<_> = inwards.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, t)| *t).collect();
-            assert!(!is_shut(&but_one), "inwards, one missing");
+            assert!(!is_closed(&but_one), "inwards, one missing");
             assert!(!changed(&|t| t[i].vertices.swap(0, 1)), "one turned over");
             assert!(!changed(&|t| t[i] = whole[(i + 1) % 12]), "one twice");
             assert!(!changed(&|t| t[i] = whole[(i + 6) % 12]), "a face without and one with too much");
@@ -77,8 +79,8 @@ fn a_box_is_shut_if_nothing_is_missing() {
             assert!(!changed(&|t| t[i].vertices = across) || across == whole[i].vertices, "across the box");
         }
     }
-    assert!(!is_shut(&[]));
-    assert!(!is_shut(&cuboid(Vec3::ZERO, vec3(1.0, 0.0, 1.0), 0)), "flat");
+    assert!(!is_closed(&[]));
+    assert!(!is_closed(&cuboid(Vec3::ZERO, vec3(1.0, 0.0, 1.0), 0)), "flat");
 }
 
 /// Points in and about a box, of those where rounding could matter more than by chance.
@@ -118,7 +120,7 @@ fn a_box_and_its_triangles_say_the_same() {
         with_another.push(Triangle::new(min, min, max.with_x(min.x)));
         let diagonal = f64::from((max - min).length());
         let (fast, slow) = (media(triangles, 0.3 / diagonal), media(with_another, 0.3 / diagonal));
-        assert!(fast.bounds[0].shut && fast.only.is_some() && !slow.bounds[0].shut && slow.only.is_none());
+        assert!(fast.boundaries.is_one_box() && !slow.boundaries.is_one_box());
         let (min, max) = (min.as_dvec3(), max.as_dvec3());
         for i in 0..60_000 {
             let mut u = Sampler::new(7, i, n, 0);
@@ -135,16 +137,16 @@ fn a_box_and_its_triangles_say_the_same() {
             assert_eq!(found, slow.short_flight(&segment, FOG, tau), "{segment:?}, {tau}");
             short += u32::from(found.is_some());
             let t = tau / (0.3 / diagonal * segment.length());
-            left += u32::from(fast.bounds[0].is_left(&Segment::new(p, segment.at(t.min(1.0)))));
-            let (flight, depth) = (slow.fly(&segment, Some(FOG), tau), slow.optical_depth(&segment, Some(FOG)));
+            left += u32::from(fast.boundaries.extent(0).is_left(&Segment::new(p, segment.at(t.min(1.0)))));
+            let (flight, depth) = (slow.free_flight(&segment, Some(FOG), tau), slow.optical_depth(&segment, Some(FOG)));
             if fast.leaves_for_good(&segment, FOG, tau) {
                 gone += 1;
-                assert_eq!(flight, Flight::Passed(None), "{segment:?}, {tau}");
+                assert_eq!(flight, FreeFlight::Passed(None), "{segment:?}, {tau}");
             }
-            let way = fast.way(&segment, Some(FOG));
-            assert_eq!((way.fly(tau), way.optical_depth()), (flight, depth), "{segment:?}, {tau}");
-            let Flight::Passed(end) = slow.fly(&segment, Some(FOG), f64::INFINITY) else { panic!("collides with all") };
-            assert_eq!(way.end(), end);
+            let intervals = fast.intervals(&segment, Some(FOG));
+            assert_eq!((intervals.free_flight(tau), intervals.optical_depth()), (flight, depth), "{segment:?}, {tau}");
+            let FreeFlight::Passed(end) = slow.free_flight(&segment, Some(FOG), f64::INFINITY) else { panic!("collides with all") };
+            assert_eq!(intervals.end(), end);
         }
     }
     assert!(left > 2000 && short > 2000 && gone > 2000, "{left} left the box, {short} did not, {gone} for good");
@@ -155,7 +157,7 @@ fn a_box_and_its_triangles_say_the_same() {
 fn an_open_box_is_not_left_through_its_gap() {
     let mut shape = cuboid(Vec3::ZERO, Vec3::ONE, 0);
     shape.retain(|t| t.vertices.iter().any(|v| v.z == 0.0));
-    assert!(Bounds::of(&shape).hollow && shape.len() == 10);
+    assert!(Extent::of(&shape).shell && shape.len() == 10);
     let open = media(shape, 1.0);
     let through_the_gap = Segment::new(dvec3(0.5, 0.5, 0.5), dvec3(0.5, 0.5, 3.0));
     assert!(open.short_flight(&through_the_gap, FOG, 2.0).is_some());

@@ -1,0 +1,42 @@
+//! The pinhole camera.
+
+use glam::{DVec3, dvec3};
+use vdf_geometry::Segment;
+use vdf_scene::{FilmSettings, MediumId, PerspectiveSensor};
+
+/// A camera and its film, prepared for rays.
+#[derive(Clone, Copy, Debug)]
+pub struct Camera {
+    sensor: PerspectiveSensor,
+    /// Width and height of the full film in pixels.
+    size: [f64; 2],
+}
+
+impl Camera {
+    /// The camera of a sensor with this film.
+    #[must_use]
+    pub fn new(sensor: &PerspectiveSensor, film: &FilmSettings) -> Self {
+        Self { sensor: *sensor, size: [film.width.into(), film.height.into()] }
+    }
+
+    /// The camera ray through film position (`x`, `y`) in pixels from the top left corner of the full film: a segment from
+    /// the near to the far plane, and its unit direction. Same geometry as Mitsuba 3 `perspective`.
+    #[inline]
+    #[must_use]
+    pub fn ray(&self, x: f64, y: f64) -> (Segment, DVec3) {
+        let [width, height] = self.size;
+        let s = &self.sensor;
+        let t = s.tan_half_fov_x;
+        let local = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
+        let p = s.world_from_camera.transform_point3(local * s.near_clip);
+        let q = s.world_from_camera.transform_point3(local * s.far_clip);
+        (Segment::new(p, q), s.world_from_camera.transform_vector3(local).normalize())
+    }
+
+    /// The medium around the camera; `None` is vacuum.
+    #[inline]
+    #[must_use]
+    pub const fn medium(&self) -> Option<MediumId> {
+        self.sensor.medium
+    }
+}

@@ -1,0 +1,137 @@
+//! A render with all options resolved: which pixels, how many samples, and the path of any one sample.
+//!
+//! Every random number is a function of (seed, pixel, sample, dimension), so a path is the same whoever follows it, and in whatever order.
+
+use vdf_scene::{PixelRect, ReconstructionFilter, Rgb};
+use vdf_visibility::{Counters, Recorder, Visibility};
+
+use crate::{
+    Camera, Integrator, PreparedScene, RenderOptions, Sampler,
+    film::sample_filter,
+    integrator::{PathRay, Tracer},
+};
+
+/// Side of a tile in pixels. Only progress sees tiles.
+const TILE: u32 = 16;
+
+/// What to render, with all options resolved.
+#[derive(Clone, Debug)]
+pub struct Job<'a> {
+    prepared: &'a PreparedScene,
+    options: &'a RenderOptions,
+    camera: Camera,
+    crop: PixelRect,
+    spp: u32,
+    seed: u64,
+}
+
+/// Follows the paths of a job; one for each thread or for all of them.
+#[derive(Debug)]
+pub struct PathTracer<'a, R> {
+    tracer: Tracer<'a, R>,
+    camera: Camera,
+    filter: ReconstructionFilter,
+    integrator: Integrator,
+    seed: u64,
+}
+
+impl<'a> Job<'a> {
+    pub(crate) fn new(prepared: &'a PreparedScene, options: &'a RenderOptions) -> Self {
+        let scene = prepared.scene();
+        Self {
+            prepared,
+            options,
+            camera: Camera::new(&scene.sensor, &scene.film),
+            crop: options.crop.unwrap_or(scene.film.crop),
+            spp: options.spp.unwrap_or(scene.sample_count),
+            seed: options.seed.unwrap_or(scene.seed),
+        }
+    }
+
+    /// What is rendered.
+    #[must_use]
+    pub const fn prepared(&self) -> &'a PreparedScene {
+        self.prepared
+    }
+
+    /// The options as they were given.
+    #[must_use]
+    pub const fn options(&self) -> &'a RenderOptions {
+        self.options
+    }
+
+    /// The pixels of the full film that are rendered.
+    #[must_use]
+    pub const fn crop(&self) -> PixelRect {
+        self.crop
+    }
+
+    /// Width and height of the image in pixels.
+    #[must_use]
+    pub const fn size(&self) -> [u32; 2] {
+        [self.crop.x1 - self.crop.x0, self.crop.y1 - self.crop.y0]
+    }
+
+    /// Samples per pixel.
+    #[must_use]
+    pub const fn spp(&self) -> u32 {
+        self.spp
+    }
+
+    /// Seed of the random numbers.
+    #[must_use]
+    pub const fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The tiles, row by row.
+    #[must_use]
+    pub fn tiles(&self) -> Vec<PixelRect> {
+        let PixelRect { x0, y0, x1, y1 } = self.crop;
+        (y0..y1)
+            .step_by(TILE as usize)
+            .flat_map(|y| (x0..x1).step_by(TILE as usize).map(move |x| (x, y)))
+            .map(|(x, y)| PixelRect { x0: x, y0: y, x1: (x + TILE).min(x1), y1: (y + TILE).min(y1) })
+            .collect()
+    }
+
+    /// Who follows the paths, asking the scene's own provers.
+    #[must_use]
+    pub fn tracer(&self) -> PathTracer<'a, vdf_visibility::NoRecorder> {
+        self.tracer_with(self.prepared.visibility().segment_first(self.options.segment_first))
+    }
+
+    /// Who follows the paths and lets `recorder` hear of every visibility query.
+    #[must_use]
+    pub fn recording_tracer<R: Recorder>(&self, recorder: R) -> PathTracer<'a, R> {
+        self.tracer_with(self.prepared.visibility().recorded(recorder))
+    }
+
+    fn tracer_with<R: Recorder>(&self, visibility: Visibility<'a, R>) -> PathTracer<'a, R> {
+        let scene = self.prepared.scene();
+        PathTracer {
+            tracer: Tracer {
+                world: self.prepared.world(),
+                visibility,
+                settings: scene.integrator,
+                transmittance: self.options.transmittance,
+            },
+            camera: self.camera,
+            filter: scene.film.filter,
+            integrator: self.options.integrator,
+            seed: self.seed,
+        }
+    }
+}
+
+impl<R: Recorder> PathTracer<'_, R> {
+    /// The radiance of one path: sample number `sample` of pixel (`x`, `y`) of the full film.
+    #[inline]
+    pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> Rgb {
+        let mut sampler = Sampler::new(self.seed, x, y, sample);
+        let [dx, dy] = sample_filter(&self.filter, &mut sampler);
+        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy);
+        let ray = PathRay { segment, direction, medium: self.camera.medium() };
+        self.tracer.radiance(self.integrator, ray, &mut sampler, counters)
+    }
+}

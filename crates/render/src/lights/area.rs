@@ -1,0 +1,86 @@
+//! Area emitters: the front sides of a shape's triangles, drawn uniformly by area.
+
+use glam::DVec3;
+use vdf_geometry::Triangle;
+use vdf_scene::Rgb;
+
+use super::LightSample;
+
+/// The triangles of one shape that shines.
+#[derive(Debug)]
+pub(super) struct AreaLight {
+    triangles: Vec<Triangle>,
+    /// Running sum of the triangles' areas.
+    cumulative_area: Vec<f64>,
+    radiance: Rgb,
+}
+
+impl AreaLight {
+    pub(super) fn new(triangles: &[Triangle], radiance: Rgb) -> Self {
+        let triangles: Vec<_> = triangles.iter().copied().filter(|t| t.area_normal() != DVec3::ZERO).collect();
+        let cumulative_area = triangles
+            .iter()
+            .scan(0.0, |sum, t| {
+                *sum += 0.5 * t.area_normal().length();
+                Some(*sum)
+            })
+            .collect();
+        Self { triangles, cumulative_area, radiance }
+    }
+
+    fn area(&self) -> f64 {
+        self.cumulative_area.last().copied().unwrap_or(0.0)
+    }
+
+    /// A sample of the light as seen from `from`. `choices` is the number of emitters of which this one was drawn.
+    #[inline]
+    pub(super) fn sample(
+        &self,
+        emitter: usize,
+        from: DVec3,
+        u: [f64; 2],
+        choices: f64,
+        lift: f64,
+    ) -> Option<LightSample> {
+        // Nothing can be sampled on an emitter without area.
+        if self.area() <= 0.0 {
+            return None;
+        }
+        let (triangle, point) = self.sample_point(u);
+        let normal = triangle.area_normal().normalize();
+        let d = point - from;
+        let distance2 = d.length_squared();
+        let direction = d / distance2.sqrt();
+        let cos_theta = -direction.dot(normal);
+        if !(cos_theta > 0.0 && distance2 > 0.0) {
+            return None;
+        }
+        let pdf = distance2 / (cos_theta * self.area() * choices);
+        Some(LightSample {
+            emitter,
+            point: point + normal * lift,
+            direction,
+            weight: self.radiance * (1.0 / pdf) as f32,
+            pdf,
+            on_surface: true,
+        })
+    }
+
+    /// The density per steradian with which a point `distance` away, seen under `cos_theta` to its normal, is drawn.
+    #[inline]
+    pub(super) fn pdf(&self, distance: f64, cos_theta: f64, choices: f64) -> f64 {
+        distance * distance / (cos_theta * self.area() * choices)
+    }
+
+    /// A triangle and a point on it, uniform over the area.
+    fn sample_point(&self, [u0, u1]: [f64; 2]) -> (&Triangle, DVec3) {
+        let target = u0 * self.area();
+        let i = self.cumulative_area.partition_point(|&a| a <= target).min(self.triangles.len() - 1);
+        let before = if i == 0 { 0.0 } else { self.cumulative_area[i - 1] };
+        // What is left of u0 within the triangle's share is uniform again.
+        let u0 = ((target - before) / (self.cumulative_area[i] - before)).clamp(0.0, 1.0);
+        let root = u0.sqrt();
+        let [a, b, c] = self.triangles[i].vertices_f64();
+        (&self.triangles[i], a * (1.0 - root) + b * (root * (1.0 - u1)) + c * (root * u1))
+    }
+}

@@ -1,0 +1,28 @@
+//! Constant emitters: the same radiance from every direction. A direction is drawn uniformly from the sphere.
+
+use glam::DVec3;
+use vdf_scene::Rgb;
+
+use super::LightSample;
+use crate::frame::sample_uniform_sphere;
+
+/// A sample of the background, whose directions are drawn with density `pdf` and followed for `reach` world units.
+#[inline]
+pub(super) fn sample(
+    emitter: usize,
+    from: DVec3,
+    u: [f64; 2],
+    background: Rgb,
+    pdf: f64,
+    reach: f64,
+) -> LightSample {
+    let direction = sample_uniform_sphere(u);
+    LightSample {
+        emitter,
+        point: from + direction * reach,
+        direction,
+        weight: background * (1.0 / pdf) as f32,
+        pdf,
+        on_surface: false,
+    }
+}

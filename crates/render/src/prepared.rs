@@ -1,0 +1,146 @@
+//! A scene made ready to be rendered: its world, its hierarchy and the provers of a method, which belong together.
+
+use std::{sync::Arc, time::Instant};
+
+use vdf_geometry::Bounds;
+use vdf_scene::Scene;
+use vdf_visibility::{BuildReport, Method, ProverOptions, Provers, Visibility};
+
+use crate::{
+    PrepareOptions, Progress, RenderError, RenderOptions, Rendering, World, job::Job, light_shapes, render::render,
+    threads::on_threads,
+};
+
+/// A scene with everything that its renders share. Immutable; renders of it build nothing.
+///
+/// World and provers come from one scene and cannot be exchanged, for proofs about one scene are wrong in another.
+#[derive(Debug)]
+pub struct PreparedScene {
+    scene: Arc<Scene>,
+    world: Arc<World>,
+    /// Seconds that the world took.
+    t_hierarchy: f64,
+    method: Method,
+    provers: Provers,
+    build: BuildReport,
+}
+
+impl PreparedScene {
+    /// Prepares `scene`: the hierarchy over its occluders, and what the method needs.
+    ///
+    /// # Errors
+    /// If an option or the voxel size is not usable, the voxels exceed `options.max_voxels`, or `progress` asks to stop.
+    pub fn new(
+        scene: impl Into<Arc<Scene>>,
+        options: &PrepareOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, RenderError> {
+        options.validate()?;
+        let scene = scene.into();
+        on_threads(options.threads, || {
+            progress.phase("hierarchy");
+            let start = Instant::now();
+            let world = Arc::new(World::new(&scene));
+            Self::build(scene, world, start.elapsed().as_secs_f64(), options, progress)
+        })
+    }
+
+    /// The same scene with other provers; the world and its hierarchy are shared, not built again.
+    ///
+    /// # Errors
+    /// As [`PreparedScene::new`].
+    pub fn with_options(&self, options: &PrepareOptions, progress: &dyn Progress) -> Result<Self, RenderError> {
+        options.validate()?;
+        let (scene, world) = (Arc::clone(&self.scene), Arc::clone(&self.world));
+        on_threads(options.threads, || Self::build(scene, world, self.t_hierarchy, options, progress))
+    }
+
+    fn build(
+        scene: Arc<Scene>,
+        world: Arc<World>,
+        t_hierarchy: f64,
+        options: &PrepareOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, RenderError> {
+        if progress.cancelled() {
+            return Err(RenderError::Cancelled);
+        }
+        progress.phase("distance field");
+        let lights = light_shapes(&scene);
+        let bounds = world.bounds;
+        let method = options.method.unwrap_or_else(|| Method::for_lights(&lights));
+        let voxel_size = options.voxel_size.unwrap_or_else(|| default_voxel_size(&bounds));
+        let options = ProverOptions { method, voxel_size, max_voxels: options.max_voxels };
+        let (provers, build) = Provers::build(&options, &world.triangles, bounds, &lights)?;
+        drop(lights);
+        Ok(Self { scene, world, t_hierarchy, method, provers, build })
+    }
+
+    /// Renders the scene. Builds nothing.
+    ///
+    /// # Errors
+    /// If an option is not usable, or `progress` asks to stop.
+    pub fn render(&self, options: &RenderOptions, progress: &dyn Progress) -> Result<Rendering, RenderError> {
+        let job = self.job(options)?;
+        on_threads(options.threads, || render(&job, progress))
+    }
+
+    /// The render of these options, to be followed path by path.
+    ///
+    /// # Errors
+    /// If an option is not usable.
+    pub fn job<'a>(&'a self, options: &'a RenderOptions) -> Result<Job<'a>, RenderError> {
+        options.validate(&self.scene)?;
+        Ok(Job::new(self, options))
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene as integrators see it.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The method whose provers these are.
+    #[must_use]
+    pub const fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The provers.
+    #[must_use]
+    pub const fn provers(&self) -> &Provers {
+        &self.provers
+    }
+
+    /// What was built for the method.
+    #[must_use]
+    pub const fn build_report(&self) -> &BuildReport {
+        &self.build
+    }
+
+    /// Seconds that the hierarchy took, with all that does not depend on the method.
+    #[must_use]
+    pub const fn t_hierarchy(&self) -> f64 {
+        self.t_hierarchy
+    }
+
+    /// Who answers the scene's visibility queries.
+    #[must_use]
+    pub fn visibility(&self) -> Visibility<'_> {
+        Visibility::new(&self.world.bvh, &self.provers)
+    }
+}
+
+/// A 128th of the longest side of these bounds, the side of a voxel where none is given; 1 if they are one point.
+#[must_use]
+pub fn default_voxel_size(bounds: &Bounds) -> f64 {
+    let extent = bounds.extent().max_element();
+    // A scene of one point has no extent; any size covers it with one voxel.
+    if extent > 0.0 { extent / 128.0 } else { 1.0 }
+}

@@ -1,0 +1,45 @@
+//! The errors of this crate.
+
+use std::path::PathBuf;
+
+/// Why a scene could not be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// A scene file says something that is wrong or not supported.
+    #[error("{}:{line}:{column}: {message}{}", path.display(), help_line(help))]
+    Element {
+        /// The file, as it was named by the user or by the file that includes it.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u32,
+        /// Column in characters, from 1.
+        column: u32,
+        /// What is wrong.
+        message: String,
+        /// How to mend it; may be empty.
+        help: String,
+    },
+    /// A file of the scene could not be read.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why it could not be read.
+        message: String,
+    },
+    /// A parameter that the caller defined is malformed, or the scene never uses it.
+    #[error("parameter {name}: {message}{}", help_line(help))]
+    Define {
+        /// The name that was defined.
+        name: String,
+        /// What is wrong.
+        message: String,
+        /// How to mend it; may be empty.
+        help: String,
+    },
+}
+
+fn help_line(help: &str) -> String {
+    if help.is_empty() { String::new() } else { format!("\n  help: {help}") }
+}

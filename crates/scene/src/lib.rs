@@ -1,0 +1,38 @@
+//! Scenes: what a file describes, resolved, checked and ready to render.
+//!
+//! A scene file is a strict subset of Mitsuba 3 XML with OBJ meshes. [`Scene::load`] reads one; everything that is not in the subset is a
+//! [`SceneError`] with file, line and column. This crate knows nothing of voxels, of methods of acceleration or of a command line.
+//!
+//! ```
+//! use vdf_scene::{EmbeddedFile, LoadOptions, Scene, SceneSource};
+//!
+//! # fn main() -> Result<(), vdf_scene::SceneError> {
+//! let text = r#"<scene version="3.0.0">
+//!     <integrator type="volpath"/>
+//!     <sensor type="perspective"><film type="hdrfilm"/></sensor>
+//!     <shape type="cube"><bsdf type="diffuse"/></shape>
+//!     <emitter type="constant"/>
+//! </scene>"#;
+//! let file = EmbeddedFile { path: "cube.xml".into(), text: text.into() };
+//! let scene = Scene::from_source(&SceneSource::embedded(file, vec![]), &LoadOptions::default())?;
+//! assert_eq!(scene.surfaces[0].triangles.len(), 12);
+//! # Ok(())
+//! # }
+//! ```
+
+mod checksum;
+mod error;
+mod load;
+mod model;
+mod source;
+
+pub use error::SceneError;
+pub use load::LoadOptions;
+pub use model::{
+    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
+    ReconstructionFilter, Scene, Surface,
+};
+pub use source::{EmbeddedFile, SceneSource};
+
+/// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.
+pub type Rgb = glam::Vec3;

@@ -1,0 +1,138 @@
+//! Loading a scene: a strict subset of Mitsuba 3 XML. Everything that is not in the subset is an error.
+
+mod camera;
+mod checks;
+mod document;
+mod names;
+mod objects;
+mod parameters;
+mod properties;
+mod shapes;
+#[cfg(test)]
+mod tests;
+mod transform;
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::path::Path;
+
+use document::{Element, Ids, OBJECT_TAGS, Place};
+use parameters::Parameters;
+
+use crate::{Boundary, Emitter, Medium, MediumId, Scene, SceneError, SceneSource, Surface};
+
+/// What the user adds to a scene file.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// Values of the scene's `$name` parameters, stronger than its `<default>`s. One that the scene does not use is
+    /// an error.
+    pub defines: Vec<(String, String)>,
+}
+
+impl Scene {
+    /// Loads a scene file.
+    pub fn load(path: &Path, options: &LoadOptions) -> Result<Self, SceneError> {
+        Self::from_source(&SceneSource::disk(path), options)
+    }
+
+    /// Loads a scene from disk or from memory.
+    pub fn from_source(source: &SceneSource, options: &LoadOptions) -> Result<Self, SceneError> {
+        let mut parameters = Parameters::new(&options.defines)?;
+        let root = document::read(source, &mut parameters)?;
+        parameters.check_all_used()?;
+        let loader = Loader {
+            source,
+            ids: Ids::collect(&root)?,
+            warnings: RefCell::default(),
+            media: Vec::new(),
+            medium_of_element: HashMap::new(),
+            surfaces: Vec::new(),
+            boundaries: Vec::new(),
+            boundary_places: Vec::new(),
+            emitters: Vec::new(),
+        };
+        loader.scene(&root)
+    }
+}
+
+/// The scene while it is being put together.
+#[derive(Debug)]
+struct Loader<'a> {
+    source: &'a SceneSource,
+    ids: Ids<'a>,
+    warnings: RefCell<Vec<String>>,
+    media: Vec<Medium>,
+    medium_of_element: HashMap<usize, MediumId>,
+    surfaces: Vec<Surface>,
+    boundaries: Vec<Boundary>,
+    /// Where each boundary's shape is.
+    boundary_places: Vec<&'a Place>,
+    emitters: Vec<Emitter>,
+}
+
+impl<'a> Loader<'a> {
+    fn warn(&self, at: &Place, message: &str) {
+        self.warnings.borrow_mut().push(format!("{at}: {message}"));
+    }
+
+    fn scene(mut self, root: &'a Element) -> Result<Scene, SceneError> {
+        let (mut sensor, mut integrator, mut constant) = (None, None, None);
+        for element in &root.children {
+            match element.tag.as_str() {
+                "shape" => shapes::read(&mut self, element)?,
+                "medium" => drop(objects::medium(&mut self, element)?),
+                // Read where they are used; here only checked, so that an unused one cannot hide a mistake.
+                "bsdf" => drop(objects::bsdf(&self, element)?),
+                "phase" => drop(objects::phase(&self, element)?),
+                "emitter" => {
+                    let emitter = objects::emitter(&self, element)?;
+                    if matches!(emitter, Emitter::Constant { .. }) {
+                        only_one(&mut constant, element, "constant emitter")?;
+                    }
+                    self.emitters.push(emitter);
+                }
+                "sensor" => only_one(&mut sensor, element, "sensor")?,
+                "integrator" => only_one(&mut integrator, element, "integrator")?,
+                "alias" => {}
+                tag => {
+                    let help = if OBJECT_TAGS.contains(&tag) {
+                        "film and sampler belong inside <sensor>, rfilter inside <film>"
+                    } else {
+                        "a property belongs inside an object; supported here: integrator, sensor, shape, emitter, medium, phase, bsdf, default, include, alias"
+                    };
+                    return Err(element.at.error(format!("<{tag}> directly inside <scene>"), help));
+                }
+            }
+        }
+        let missing =
+            |what: &str, how: &str| Err(root.at.error(format!("the scene has no {what}"), format!("add {how}")));
+        let Some(sensor) = sensor else { return missing("sensor", "<sensor type=\"perspective\">") };
+        let Some(integrator) = integrator else { return missing("integrator", "<integrator type=\"volpath\"/>") };
+        let integrator = camera::integrator(&self, integrator)?;
+        let camera = camera::read(&mut self, sensor)?;
+        if self.emitters.is_empty() {
+            self.warn(&root.at, "the scene has no emitter: the image will be black");
+        }
+        checks::media_are_consistent(&self, &camera.sensor, &sensor.at, constant.map(|e: &Element| &e.at))?;
+        Ok(Scene {
+            surfaces: self.surfaces,
+            boundaries: self.boundaries,
+            media: self.media,
+            emitters: self.emitters,
+            sensor: camera.sensor,
+            film: camera.film,
+            integrator,
+            sample_count: camera.sample_count,
+            seed: camera.seed,
+            warnings: self.warnings.into_inner(),
+        })
+    }
+}
+
+fn only_one<'a>(slot: &mut Option<&'a Element>, element: &'a Element, what: &str) -> Result<(), SceneError> {
+    if let Some(first) = slot.replace(element) {
+        let message = format!("a second {what}");
+        return Err(element.at.error(message, format!("the first is at {}; only one is supported", first.at)));
+    }
+    Ok(())
+}

@@ -1,0 +1,176 @@
+//! Plain data: a scene as the renderer sees it.
+
+use glam::{DMat4, DVec3};
+use vdf_geometry::Triangle;
+
+use crate::Rgb;
+
+/// Index into [`Scene::media`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MediumId(pub u32);
+
+/// Everything that is needed to render, with all names resolved and all transforms applied.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The opaque shapes: the occluders.
+    pub surfaces: Vec<Surface>,
+    /// The shapes with a `null` BSDF: they never block, they only change the medium.
+    pub boundaries: Vec<Boundary>,
+    /// The participating media.
+    pub media: Vec<Medium>,
+    /// The emitters, in the order of the file.
+    pub emitters: Vec<Emitter>,
+    /// The camera.
+    pub sensor: PerspectiveSensor,
+    /// The image plane.
+    pub film: FilmSettings,
+    /// Path depth limits.
+    pub integrator: IntegratorSettings,
+    /// Samples per pixel; at least 1.
+    pub sample_count: u32,
+    /// Seed of the sampler.
+    pub seed: u64,
+    /// What is legal but probably not meant, one message each, with file and line.
+    pub warnings: Vec<String>,
+}
+
+/// An opaque shape.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// The shape's triangles, in world units.
+    pub triangles: Vec<Triangle>,
+    /// How it reflects.
+    pub bsdf: Bsdf,
+    /// Radiance emitted from the front side (the side of the normal), if the shape is an area emitter. Such a
+    /// surface also has an [`Emitter::Area`] in [`Scene::emitters`].
+    pub radiance: Option<Rgb>,
+}
+
+/// A Lambertian reflector, each side with its own reflectance; black where a side does not reflect.
+///
+/// Mitsuba's `diffuse` has a black back; `twosided` puts a `diffuse` on each side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bsdf {
+    /// Reflectance of the side of the normal, each channel in [0, 1].
+    pub front: Rgb,
+    /// Reflectance of the other side, each channel in [0, 1].
+    pub back: Rgb,
+}
+
+/// A surface between two media, index-matched: light passes it unchanged.
+#[derive(Clone, Debug)]
+pub struct Boundary {
+    /// The shape's triangles, in world units.
+    pub triangles: Vec<Triangle>,
+    /// The medium behind the surface (against the normal); `None` is vacuum.
+    pub interior: Option<MediumId>,
+    /// The medium in front of the surface (along the normal); `None` is vacuum.
+    pub exterior: Option<MediumId>,
+}
+
+/// A homogeneous participating medium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Extinction coefficient in 1/world unit, including the file's `scale`; finite and at least 0.
+    pub sigma_t: f64,
+    /// Single-scattering albedo σ_s/σ_t, each channel in [0, 1].
+    pub albedo: Rgb,
+    /// Phase function.
+    pub phase: Phase,
+}
+
+/// A phase function.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Phase {
+    /// 1/4π everywhere.
+    Isotropic,
+    /// Henyey–Greenstein with mean cosine `g` in (−1, 1); positive scatters forward.
+    HenyeyGreenstein {
+        /// Mean cosine.
+        g: f64,
+    },
+}
+
+/// A light source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Emitter {
+    /// A point that radiates equally in all directions.
+    Point {
+        /// Position in world units.
+        position: DVec3,
+        /// Radiant intensity in W/sr.
+        intensity: Rgb,
+    },
+    /// The front side of a surface.
+    Area {
+        /// Index into [`Scene::surfaces`]; that surface has a `radiance`.
+        surface: usize,
+    },
+    /// The same radiance from every direction, infinitely far away.
+    Constant {
+        /// Radiance.
+        radiance: Rgb,
+    },
+}
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PerspectiveSensor {
+    /// Camera to world: +X is left in the image, +Y up, +Z forward; a rigid transform.
+    pub world_from_camera: DMat4,
+    /// tan(X/2), where X is the horizontal field of view of the full film; positive.
+    pub tan_half_fov_x: f64,
+    /// Rays start on this plane, in world units along +Z.
+    pub near_clip: f64,
+    /// Rays end on this plane, in world units along +Z.
+    pub far_clip: f64,
+    /// The medium around the camera; `None` is vacuum.
+    pub medium: Option<MediumId>,
+}
+
+/// The image that is recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmSettings {
+    /// Full width in pixels.
+    pub width: u32,
+    /// Full height in pixels.
+    pub height: u32,
+    /// The part of the full image to render; the whole image unless the film is cropped.
+    pub crop: PixelRect,
+    /// Reconstruction filter.
+    pub filter: ReconstructionFilter,
+}
+
+/// A rectangle of pixels, half open: `x0 ≤ x < x1`, `y0 ≤ y < y1`; (0, 0) is the top left pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRect {
+    /// First column.
+    pub x0: u32,
+    /// First row.
+    pub y0: u32,
+    /// One past the last column.
+    pub x1: u32,
+    /// One past the last row.
+    pub y1: u32,
+}
+
+/// How samples around a pixel are weighted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ReconstructionFilter {
+    /// The pixel's own square.
+    Box,
+    /// max(0, exp(−x²/2σ²) − exp(−r²/2σ²)) in x and in y, with r = 4σ.
+    Gaussian {
+        /// Standard deviation σ in pixels; positive.
+        stddev: f64,
+    },
+}
+
+/// Limits of the paths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IntegratorSettings {
+    /// Longest path in scattering events plus one, as Mitsuba counts; `None` is unlimited.
+    pub max_depth: Option<u32>,
+    /// Russian roulette starts beyond this depth.
+    pub rr_depth: u32,
+}

@@ -1,0 +1,63 @@
+//! What changes the checksum of a scene, and what does not.
+
+use std::collections::HashSet;
+
+use vdf_scene::{LoadOptions, Phase, ReconstructionFilter, Rgb, Scene};
+use vdf_scenes::builtin;
+
+fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
+    let defines = defines.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
+    Scene::from_source(&builtin(name).expect("it is built in"), &LoadOptions { defines }).expect("it loads")
+}
+
+#[test]
+fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
+    let scene = loaded("cbox_vol3", &[]);
+    let same: [fn(&mut Scene); 4] = [
+        |s| s.seed += 1,
+        |s| s.sample_count += 1,
+        |s| s.film.crop.x0 += 1,
+        |s| s.warnings.push("a warning".into()),
+    ];
+    for change in same {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        assert_eq!(changed.checksum(), scene.checksum());
+    }
+    let other: [fn(&mut Scene); 17] = [
+        |_| {},
+        |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
+        |s| s.surfaces[0].triangles.swap(0, 1),
+        |s| s.surfaces[0].bsdf.front.y = 0.125,
+        |s| s.surfaces[0].bsdf.back.y = 0.125,
+        |s| s.surfaces[0].radiance = Some(Rgb::ZERO),
+        |s| drop(s.surfaces.pop()),
+        |s| s.boundaries[0].interior = None,
+        |s| s.boundaries[0].exterior = s.boundaries[0].interior,
+        |s| s.media[0].sigma_t *= 1.5,
+        |s| s.media[0].phase = Phase::HenyeyGreenstein { g: 0.0 },
+        |s| s.emitters.reverse(),
+        |s| s.sensor.tan_half_fov_x *= 1.5,
+        |s| s.sensor.world_from_camera.w_axis.x += 1.0,
+        |s| s.film.width += 1,
+        |s| s.film.filter = ReconstructionFilter::Gaussian { stddev: 0.625 },
+        |s| s.integrator.max_depth = Some(77),
+    ];
+    let sums: HashSet<_> = other
+        .iter()
+        .map(|change| {
+            let mut changed = scene.clone();
+            change(&mut changed);
+            changed.checksum()
+        })
+        .collect();
+    assert_eq!(sums.len(), other.len());
+}
+
+#[test]
+fn it_is_that_of_the_resolved_scene() {
+    let scene = loaded("cbox_vol2", &[]).checksum();
+    assert_eq!(loaded("cbox_vol2", &[("spp", "3")]).checksum(), scene);
+    assert_ne!(loaded("cbox_vol2", &[("width", "33")]).checksum(), scene);
+    assert_ne!(loaded("cbox_vol3", &[]).checksum(), scene);
+}

@@ -1,0 +1,41 @@
+//! How many queries were asked and how they were answered.
+
+/// Counts of one thread or of a whole render.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Visibility queries, N.
+    pub queries: u64,
+    /// Those that were spatial.
+    pub spatial: u64,
+    /// Those of the spatial ones that a proof answered.
+    pub proved: u64,
+    /// Superficial queries of which only the end on an area light lies on an occluder.
+    pub on_light: u64,
+    /// Those of them that a proof answered.
+    pub on_light_proved: u64,
+    /// Rays cast for the first occluder.
+    pub rays: u64,
+    /// Free flights that were asked for a proof: those that neither start nor end on an occluder.
+    pub flights: u64,
+    /// Those that were proved free, each a ray saved; with any method those that miss the bounds of all occluders are among them.
+    pub flights_proved: u64,
+    /// Camera paths.
+    pub paths: u64,
+    /// Paths whose radiance was not finite or negative and was therefore left out. Must be 0.
+    pub refused: u64,
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.queries += other.queries;
+        self.spatial += other.spatial;
+        self.proved += other.proved;
+        self.on_light += other.on_light;
+        self.on_light_proved += other.on_light_proved;
+        self.rays += other.rays;
+        self.flights += other.flights;
+        self.flights_proved += other.flights_proved;
+        self.paths += other.paths;
+        self.refused += other.refused;
+    }
+}

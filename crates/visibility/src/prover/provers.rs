@@ -1,0 +1,100 @@
+//! All provers of one scene: a prover for each light, and the field that they share.
+
+use glam::DVec3;
+use vdf_distfield::Neighbourhood as _;
+use vdf_voxel::{VoxelGrid, VoxelSet};
+
+use super::{Answer, DistanceField, FieldProver, LightProver};
+use crate::{QueryKind, ShadowQuery, VisibilityError};
+
+/// What a method built for a scene.
+#[derive(Debug)]
+pub struct Provers {
+    grid: Option<VoxelGrid>,
+    field: Option<FieldProver>,
+    lights: Vec<LightProver>,
+}
+
+impl Provers {
+    /// The provers of the method `none`: they prove nothing.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self { grid: None, field: None, lights: Vec::new() }
+    }
+
+    pub(crate) const fn new(grid: VoxelGrid, field: Option<FieldProver>, lights: Vec<LightProver>) -> Self {
+        Self { grid: Some(grid), field, lights }
+    }
+
+    /// The field, if there is one.
+    #[must_use]
+    pub const fn field(&self) -> Option<&FieldProver> {
+        self.field.as_ref()
+    }
+
+    /// The grid of the voxels; `None` for the method `none`.
+    #[must_use]
+    pub const fn grid(&self) -> Option<&VoxelGrid> {
+        self.grid.as_ref()
+    }
+
+    /// The prover of light `emitter`, a number in the list that they were built for.
+    #[must_use]
+    pub fn light(&self, emitter: usize) -> Option<&LightProver> {
+        self.lights.get(emitter)
+    }
+
+    /// What is known of the query's closed segment. Never wrong; about a superficial query nothing is known.
+    #[inline]
+    #[must_use]
+    pub fn answer(&self, query: &ShadowQuery) -> Answer {
+        match query.kind {
+            QueryKind::Spatial => self.answer_spatial(query.emitter, query.from, query.to),
+            QueryKind::OnLight => self.answer_on_light(query.emitter, query.from, query.to),
+            QueryKind::Superficial => Answer::Unknown,
+        }
+    }
+
+    /// What is known of the closed segment between any two points.
+    #[inline]
+    #[must_use]
+    pub fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
+        self.field.as_ref().map_or(Answer::Unknown, |field| field.answer(a, b))
+    }
+
+    #[inline]
+    fn answer_spatial(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+        let (Some(grid), Some(light)) = (&self.grid, self.lights.get(emitter)) else { return Answer::Unknown };
+        // A neighbourhood knows nothing of points outside the grid; the field clips them.
+        match (light, grid.voxel_containing(from)) {
+            (LightProver::Safe(n), Some(voxel)) => Answer::unoccluded_if(n.proves(voxel)),
+            (LightProver::Extended(n), Some(voxel)) => Answer::unoccluded_if(n.proves(voxel)),
+            _ => self.answer_between(from, to),
+        }
+    }
+
+    #[inline]
+    fn answer_on_light(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+        match (&self.grid, self.lights.get(emitter)) {
+            (Some(grid), Some(LightProver::Area(area))) => Answer::unoccluded_if(area.proves(grid, from, to)),
+            _ => Answer::Unknown,
+        }
+    }
+
+    /// Checks the field and the neighbourhoods of point lights against the occupied voxels that they were built from. The neighbourhoods
+    /// of area lights, built from fewer occluders, are not looked at.
+    ///
+    /// # Errors
+    /// The first value that is wrong.
+    pub fn validate(&self, occupied: &VoxelSet) -> Result<(), VisibilityError> {
+        self.field().map(FieldProver::field).map_or(Ok(()), |f: &DistanceField| f.validate(occupied))?;
+        for light in &self.lights {
+            match light {
+                LightProver::Safe(n) => n.validate(occupied)?,
+                LightProver::Extended(n) => n.validate(occupied)?,
+                LightProver::Field | LightProver::Area(_) => {}
+            }
+        }
+        Ok(())
+    }
+}

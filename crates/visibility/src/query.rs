@@ -1,0 +1,137 @@
+//! Visibility queries: the one place where provers, the hierarchy and the counters meet. Integrators ask it and nothing else.
+
+use glam::DVec3;
+use vdf_geometry::{Bvh, Hit, Segment};
+
+use crate::{Answer, Counters, Provers};
+
+/// A question for [`Visibility::unoccluded`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadowQuery {
+    /// Where light would arrive.
+    pub from: DVec3,
+    /// The sampled point on the emitter.
+    pub to: DVec3,
+    /// Number of the emitter.
+    pub emitter: usize,
+    /// Which ends lie on an occluder.
+    pub kind: QueryKind,
+}
+
+/// Which ends of a query lie on an occluder (Def. 2 in \[Houska2013\]).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QueryKind {
+    /// Neither end: what fields and neighbourhoods prove.
+    Spatial,
+    /// Only the end on an area light: superficial, but the light's own neighbourhood may prove it (4.4.1).
+    OnLight,
+    /// At least the end where light would arrive. Nothing is proved.
+    Superficial,
+}
+
+/// Hears every query that is asked, with its answer.
+pub trait Recorder {
+    /// `query` was asked, and this was the answer.
+    fn record(&self, query: &ShadowQuery, unoccluded: bool);
+}
+
+/// Nobody listens; compiles to nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct NoRecorder;
+
+impl Recorder for NoRecorder {
+    #[inline(always)]
+    fn record(&self, _: &ShadowQuery, _: bool) {}
+}
+
+/// Answers all visibility questions of an integrator.
+#[derive(Debug)]
+pub struct Visibility<'a, R = NoRecorder> {
+    bvh: &'a Bvh,
+    provers: &'a Provers,
+    segment_first: bool,
+    recorder: R,
+}
+
+impl<'a> Visibility<'a> {
+    /// Asks `provers` first and `bvh` for the rest; both must be about the same occluders.
+    #[must_use]
+    pub const fn new(bvh: &'a Bvh, provers: &'a Provers) -> Self {
+        Self { bvh, provers, segment_first: false, recorder: NoRecorder }
+    }
+
+    /// Asks for proofs of free flights, too, if `segment_first` is true (Sec. 2.4 in \[Houska2013\]).
+    #[must_use]
+    pub const fn segment_first(self, segment_first: bool) -> Self {
+        Self { segment_first, ..self }
+    }
+
+    /// Lets `recorder` hear of every query.
+    #[must_use]
+    pub fn recorded<R: Recorder>(self, recorder: R) -> Visibility<'a, R> {
+        let Self { bvh, provers, segment_first, recorder: NoRecorder } = self;
+        Visibility { bvh, provers, segment_first, recorder }
+    }
+}
+
+impl<R: Recorder> Visibility<'_, R> {
+    /// The first occluder along the segment.
+    #[inline]
+    #[must_use]
+    pub fn intersect(&self, segment: &Segment, counters: &mut Counters) -> Option<Hit> {
+        counters.rays += 1;
+        self.bvh.intersect(segment)
+    }
+
+    /// The first occluder along a free flight; no ray is cast if there is a proof that there is none (Sec. 2.4 in \[Houska2013\]).
+    /// `spatial` says that it does not start on an occluder.
+    #[inline]
+    #[must_use]
+    pub fn intersect_flight(&self, flight: &Segment, spatial: bool, counters: &mut Counters) -> Option<Hit> {
+        if spatial && self.segment_first {
+            counters.flights += 1;
+            // The bounds of all occluders are a proof, too, and cheaper than a field, whose bytes are seldom in the cache.
+            if self.bvh.bounds().misses(flight)
+                || self.provers.answer_between(flight.p, flight.q) == Answer::Unoccluded
+            {
+                counters.flights_proved += 1;
+                return None;
+            }
+        }
+        self.intersect(flight, counters)
+    }
+
+    /// Whether the closed segment of the query meets no occluder.
+    #[inline]
+    pub fn unoccluded(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
+        let unoccluded = self.ask(query, counters);
+        self.recorder.record(query, unoccluded);
+        unoccluded
+    }
+
+    #[inline]
+    fn ask(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
+        let answer = self.provers.answer(query);
+        let proved = u64::from(answer != Answer::Unknown);
+        counters.queries += 1;
+        match query.kind {
+            QueryKind::Spatial => {
+                counters.spatial += 1;
+                counters.proved += proved;
+            }
+            QueryKind::OnLight => {
+                counters.on_light += 1;
+                counters.on_light_proved += proved;
+            }
+            QueryKind::Superficial => {}
+        }
+        match answer {
+            Answer::Unoccluded => true,
+            Answer::Occluded => false,
+            Answer::Unknown => !self.bvh.occluded(&Segment::new(query.from, query.to)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,17 @@
+//! The errors of this crate.
+
+/// Why a scene could not be generated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScenesError {
+    /// A generated scene cannot have so few or so many triangles.
+    #[error("triangles must be from {min} to {max}, not {found}")]
+    Triangles {
+        /// The fewest.
+        min: u32,
+        /// The most.
+        max: u32,
+        /// How many were asked for.
+        found: u32,
+    },
+}
