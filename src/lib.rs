@@ -1,7 +1,10 @@
-//! `vdf` in one crate: the voxel, distance field and render crates under one roof.
-//!
-//! See `docs/ARCHITECTURE.md` for how they fit together.
-
+//! `vdf` in one crate.
 pub use vdf_distfield as distfield;
+pub use vdf_geometry as geometry;
+pub use vdf_image as image;
+pub use vdf_lab as lab;
 pub use vdf_render as render;
+pub use vdf_scene as scene;
+pub use vdf_scenes as scenes;
+pub use vdf_visibility as visibility;
 pub use vdf_voxel as voxel;

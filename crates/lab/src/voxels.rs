@@ -1,14 +1,15 @@
 //! The voxels of a scene, to look at: what a method works on, without a render.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
+use vdf_render::{PrepareOptions, PreparedScene, Progress, on_threads};
+use vdf_scene::{Emitter, Scene};
+use vdf_visibility::{Answer, BuildReport, Method, Provers, QueryKind, ShadowQuery};
 use vdf_voxel::{Voxel, VoxelGrid, VoxelSet, voxelize};
 
-use crate::{
-    Acceleration, Answer, BuildReport, Method, Proofs, ProofsVisitor, RenderError, World,
-    options::{check_voxel_size, default_voxel_size, on_threads},
-    scene::{Emitter, Scene},
-};
+use crate::LabError;
 
 /// The occupied voxels of a scene and the neighbourhoods of its point emitters.
 #[derive(Clone, Debug)]
@@ -25,87 +26,82 @@ pub struct SceneVoxels {
 }
 
 impl SceneVoxels {
-    /// Voxelizes `scene` and asks `method` about every voxel and point emitter, on `threads` threads (by default one for each
-    /// processor). By default the longest side of the scene has 128 voxels.
+    /// Voxelizes `scene` and asks the method about every voxel and point emitter. The method `none` has no voxels of its own; those of the
+    /// default method stand for it, without neighbourhoods.
     ///
     /// # Errors
-    /// If the voxel size or the number of threads is not usable, or the grid exceeds `max_voxels`.
+    /// If the voxel size or the number of threads is not usable, the grid exceeds `options.max_voxels`, or `progress` asks to stop.
     pub fn build(
-        scene: &Scene,
-        method: Method,
-        voxel_size: Option<f64>,
-        max_voxels: u64,
-        threads: Option<usize>,
-    ) -> Result<Self, RenderError> {
-        voxel_size.map_or(Ok(()), check_voxel_size)?;
-        on_threads(threads, || {
-            let world = World::new(scene);
-            let (min, max) = world.bounds;
-            let size = voxel_size.unwrap_or_else(|| default_voxel_size(world.bounds));
-            let grid = VoxelGrid::covering(min, max, size, max_voxels)?;
+        scene: impl Into<Arc<Scene>>,
+        options: &PrepareOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, LabError> {
+        let asked = options.method.unwrap_or_default();
+        let method = if asked == Method::NONE { Method::default() } else { asked };
+        let prepared = PreparedScene::new(scene, &PrepareOptions { method: Some(method), ..*options }, progress)?;
+        let (world, provers) = (prepared.world(), prepared.provers());
+        let Some(&grid) = provers.grid() else { return Err(LabError::option("method", "must have voxels")) };
+        on_threads(options.threads, || {
             let occupied = voxelize(&grid, world.triangles.par_iter().map(|t| t.vertices))?;
-            let (acceleration, build) =
-                Acceleration::build(method, &world.triangles, world.bounds, &scene.light_shapes(), size, max_voxels)?;
             let neighbourhood = |(emitter, e): (usize, &Emitter)| match *e {
-                Emitter::Point { position, .. } if method != Method::None => {
+                Emitter::Point { position, .. } if asked != Method::NONE => {
                     grid.voxel_containing(position)?;
-                    Some(acceleration.accept(Neighbourhood { grid: &grid, emitter, position }))
+                    Some(neighbourhood(&grid, provers, emitter, position))
                 }
                 _ => None,
             };
-            let neighbourhoods = scene.emitters.iter().enumerate().map(neighbourhood).collect();
-            Ok(Self { grid, occupied, neighbourhoods, build })
+            let neighbourhoods = prepared.scene().emitters.iter().enumerate().map(neighbourhood).collect();
+            Ok(Self { grid, occupied, neighbourhoods, build: prepared.build_report().clone() })
         })
     }
 }
 
 /// The voxels of `grid` whose middles are proved to see an emitter. A proof is one for all of the two voxels.
-struct Neighbourhood<'a> {
-    grid: &'a VoxelGrid,
-    emitter: usize,
-    position: DVec3,
-}
-
-impl ProofsVisitor for Neighbourhood<'_> {
-    type Output = VoxelSet;
-
-    fn visit<P: Proofs>(self, proofs: &P) -> VoxelSet {
-        let Self { grid, emitter, position } = self;
-        let half = DVec3::splat(0.5 * grid.voxel_size());
-        VoxelSet::from_rows(grid.resolution(), |j, k, row| {
-            for i in 0..grid.resolution().x {
-                let middle = grid.corner(Voxel::new(i, j, k)) + half;
-                if proofs.answer(emitter, middle, position) == Answer::Unoccluded {
-                    row[i as usize / 64] |= 1 << (i % 64);
-                }
+fn neighbourhood(grid: &VoxelGrid, provers: &Provers, emitter: usize, position: DVec3) -> VoxelSet {
+    let half = DVec3::splat(0.5 * grid.voxel_size());
+    VoxelSet::from_rows(grid.resolution(), |j, k, row| {
+        for i in 0..grid.resolution().x {
+            let middle = grid.corner(Voxel::new(i, j, k)) + half;
+            let query = ShadowQuery { from: middle, to: position, emitter, kind: QueryKind::Spatial };
+            if provers.answer(&query) == Answer::Unoccluded {
+                row[i as usize / 64] |= 1 << (i % 64);
             }
-        })
-    }
+        }
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use vdf_render::Quiet;
+    use vdf_scene::LoadOptions;
+    use vdf_scenes::builtin;
+
     use super::*;
-    use crate::scene::{LoadOptions, builtin};
 
     #[test]
     fn neighbourhoods_are_those_of_the_method() {
         let scene = Scene::from_source(&builtin("cbox_vol3").unwrap(), &LoadOptions::default()).unwrap();
-        for method in Method::ALL {
-            let voxels = SceneVoxels::build(&scene, method, Some(20.0), 1 << 20, Some(2)).unwrap();
+        let scene = Arc::new(scene);
+        let build = |method, voxel_size| {
+            let options = PrepareOptions { voxel_size, threads: Some(2), ..PrepareOptions::with_method(method) };
+            SceneVoxels::build(Arc::clone(&scene), &options, &Quiet).unwrap()
+        };
+        for method in Method::all() {
+            let voxels = build(method, Some(20.0));
             let counts: Vec<_> = voxels.neighbourhoods.iter().map(|n| n.as_ref().map(VoxelSet::count)).collect();
             assert_eq!(counts.len(), 2);
-            for (count, built) in counts.iter().zip(&voxels.build.neighbourhoods) {
-                assert_eq!(count.is_some(), method != Method::None, "{method}");
-                assert!(built.is_none() || built == count, "{method}: {built:?} {count:?}");
+            for (count, built) in counts.iter().zip(&voxels.build.lights) {
+                assert_eq!(count.is_some(), method != Method::NONE, "{method}");
+                if method != Method::NONE {
+                    assert!(built.voxels.is_none() || built.voxels == *count, "{method}: {built:?} {count:?}");
+                }
             }
             for set in voxels.neighbourhoods.iter().flatten() {
                 assert!(set.count() > 10 && set.iter().all(|v| !voxels.occupied.contains(v)), "{method}");
             }
         }
         // A method that keeps none has the same as one that does.
-        let of = |method| SceneVoxels::build(&scene, method, None, 1 << 24, None).unwrap().neighbourhoods;
-        let named = |name: &str| of(name.parse::<Method>().unwrap());
+        let named = |name: &str| build(name.parse().unwrap(), None).neighbourhoods;
         assert_eq!(named("ndf"), named("ndf-sn"));
         assert_eq!(named("amr"), named("amr-sn"));
     }

@@ -8,7 +8,7 @@
 //! alone and of each method.
 //!
 //! *Guarantee.* A stream is a function of scene, options and bound, whatever the number of threads. Every answer of a method is compared with that of
-//! the hierarchy in the same replay; a difference is [`RenderError::WrongAnswer`](crate::RenderError::WrongAnswer).
+//! the hierarchy in the same replay; a difference is [`LabError::WrongAnswer`](crate::LabError::WrongAnswer).
 //!
 //! *Cost.* Recording follows only the paths that are kept, and is a pass of its own: a render never knows of it.
 //!

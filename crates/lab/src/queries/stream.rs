@@ -1,4 +1,4 @@
-//! Streams in memory and in files. The format, version 1, is described byte by byte in `docs/query-streams.md`: a header of 80 bytes,
+//! Streams in memory and in files. The format, version 2, is described byte by byte in `docs/query-streams.md`: a header of 80 bytes,
 //! and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles that they are about.
 
 use std::{
@@ -8,12 +8,17 @@ use std::{
 };
 
 use glam::DVec3;
+use vdf_geometry::Triangle;
+use vdf_image::write_atomically;
+use vdf_render::{Integrator, PreparedScene};
+use vdf_visibility::{QueryKind, ShadowQuery};
 
-use crate::{QueryKind, RenderError, ShadowQuery, Triangle, World, scene::Scene, write_atomically};
+use crate::LabError;
 
 const MAGIC: &[u8; 8] = b"VDFQUERY";
 const TRIANGLES_MAGIC: &[u8; 8] = b"VDFTRIAN";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+const TRIANGLES_VERSION: u32 = 1;
 const HEADER: usize = 80;
 const QUERY: usize = 56;
 const SPATIAL: u32 = 1;
@@ -31,12 +36,14 @@ pub struct StreamOrigin {
     pub seed: u64,
     /// Samples per pixel of the render.
     pub spp: u32,
-    /// Samples on each path segment for `raymarch`; `None` is `volpath`.
-    pub samples_per_segment: Option<u32>,
+    /// Integrator of the render.
+    pub integrator: Integrator,
     /// Number of occluding triangles.
     pub triangles: u64,
     /// CRC-32 of their vertices.
     pub triangles_crc32: u32,
+    /// [`vdf_scene::Scene::checksum`] of the scene.
+    pub scene_crc32: u32,
     /// Number of emitters.
     pub emitters: u32,
 }
@@ -82,9 +89,9 @@ impl QueryStream {
                 out.write_all(&n.to_le_bytes())?;
             }
             out.write_all(&o.spp.to_le_bytes())?;
-            out.write_all(&o.samples_per_segment.unwrap_or(0).to_le_bytes())?;
+            out.write_all(&o.integrator.samples_per_segment().unwrap_or(0).to_le_bytes())?;
             out.write_all(&o.triangles.to_le_bytes())?;
-            for n in [o.triangles_crc32, o.emitters, crc.finalize(), 0] {
+            for n in [o.triangles_crc32, o.emitters, crc.finalize(), o.scene_crc32] {
                 out.write_all(&n.to_le_bytes())?;
             }
             self.records().try_for_each(|record| out.write_all(&record))
@@ -114,35 +121,41 @@ impl QueryStream {
     /// Reads a stream that [`QueryStream::write`] wrote.
     ///
     /// # Errors
-    /// [`RenderError::Queries`] if the file cannot be read or is not such a stream, whole and unchanged.
-    pub fn read(path: &Path) -> Result<Self, RenderError> {
-        let fail = |message: String| RenderError::Queries { path: path.to_owned(), message };
+    /// [`LabError::Queries`] if the file cannot be read or is not such a stream, whole and unchanged.
+    pub fn read(path: &Path) -> Result<Self, LabError> {
+        let fail = |message: String| LabError::Queries { path: path.to_owned(), message };
         let file = File::open(path).map_err(|e| fail(e.to_string()))?;
         let length = file.metadata().map_err(|e| fail(e.to_string()))?.len();
         let mut file = BufReader::new(file);
         decode(&mut file, length).map_err(fail)
     }
 
-    /// Checks that the stream was recorded in `scene`.
+    /// Checks that the stream was recorded in `prepared`: a light that has moved, or another fog, gives other queries.
     ///
     /// # Errors
-    /// [`RenderError::Queries`], which names `path`, if the occluders or the emitters are others.
-    pub fn check_scene(&self, path: &Path, scene: &Scene, world: &World) -> Result<(), RenderError> {
-        let o = &self.origin;
-        let same = o.triangles == world.triangles.len() as u64
-            && o.emitters as usize == scene.emitters.len()
-            && o.triangles_crc32 == triangles_crc32(&world.triangles);
-        if same {
-            return Ok(());
+    /// [`LabError::Queries`], which names `path` and what differs.
+    pub fn check_scene(&self, path: &Path, prepared: &PreparedScene) -> Result<(), LabError> {
+        let (o, scene, world) = (&self.origin, prepared.scene(), prepared.world());
+        let fail = |message| Err(LabError::Queries { path: path.to_owned(), message });
+        let help = "name the scene that it was recorded in, with the same parameters, or record it again";
+        if o.triangles != world.triangles.len() as u64 || o.emitters as usize != scene.emitters.len() {
+            return fail(format!(
+                "recorded in another scene, of {} triangles and {} emitters (here: {} and {}); {help}",
+                o.triangles,
+                o.emitters,
+                world.triangles.len(),
+                scene.emitters.len()
+            ));
         }
-        let message = format!(
-            "recorded in another scene, of {} triangles and {} emitters (here: {} and {}); name that scene, with the same -D",
-            o.triangles,
-            o.emitters,
-            world.triangles.len(),
-            scene.emitters.len()
-        );
-        Err(RenderError::Queries { path: path.to_owned(), message })
+        if o.triangles_crc32 != triangles_crc32(&world.triangles) {
+            return fail(format!("recorded in a scene whose triangles lie elsewhere; {help}"));
+        }
+        if o.scene_crc32 != scene.checksum() {
+            return fail(format!(
+                "recorded in a scene with the same triangles but other lights, media, materials or camera; {help}"
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -175,9 +188,13 @@ fn decode(file: &mut impl Read, length: u64) -> Result<QueryStream, String> {
         paths_recorded: u64_at(32),
         seed: u64_at(40),
         spp: u32_at(48),
-        samples_per_segment: Some(u32_at(52)).filter(|&n| n > 0),
+        integrator: match u32_at(52) {
+            0 => Integrator::Volpath,
+            n => Integrator::raymarch(n),
+        },
         triangles: u64_at(56),
         triangles_crc32: u32_at(64),
+        scene_crc32: u32_at(76),
         emitters: u32_at(68),
     };
     let mut stream = QueryStream { origin, queries: Vec::new(), unoccluded: Vec::new() };
@@ -233,7 +250,7 @@ pub(super) fn triangles_crc32(triangles: &[Triangle]) -> u32 {
     crc.finalize()
 }
 
-/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 1, u32 size of this header 32, u64 number of triangles, u32
+/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 2, u32 size of this header 32, u64 number of triangles, u32
 /// CRC-32 of all that follows the header, u32 0; then nine f32 each, the coordinates of three vertices. They are the exact geometry that the answers of a
 /// [`QueryStream`] are about. The file appears whole or not at all.
 ///
@@ -242,7 +259,7 @@ pub(super) fn triangles_crc32(triangles: &[Triangle]) -> u32 {
 pub fn write_triangles(path: &Path, triangles: &[Triangle]) -> io::Result<()> {
     write_atomically(path, |out| {
         out.write_all(TRIANGLES_MAGIC)?;
-        for n in [VERSION, 32] {
+        for n in [TRIANGLES_VERSION, 32] {
             out.write_all(&n.to_le_bytes())?;
         }
         out.write_all(&(triangles.len() as u64).to_le_bytes())?;

@@ -2,46 +2,41 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use vdf_render::{Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions};
+use vdf_scene::{Emitter, LoadOptions, Scene};
+use vdf_scenes::builtin;
+use vdf_visibility::{Method, QueryKind};
 
-use super::{replay::Check, *};
-use crate::{
-    Acceleration, Answer, FieldKind, IntegratorKind, Method, NeighbourhoodKind, Progress, Proofs, ProofsVisitor,
-    QueryKind, RenderError, RenderOptions, World, render,
-    scene::{LoadOptions, Scene, builtin},
-};
+use super::{replay::check, *};
+use crate::LabError;
 
-struct Quiet;
-
-impl Progress for Quiet {
-    fn phase(&self, _: &str) {}
-    fn work_total(&self, _: u64) {}
-    fn work_done(&self, _: u64) {}
-    fn cancelled(&self) -> bool {
-        false
-    }
-}
-
-fn scene(name: &str, size: &str) -> (Scene, World) {
+fn scene(name: &str, size: &str) -> Scene {
     let defines = [("width", size), ("height", size)].map(|(n, v)| (n.to_owned(), v.to_owned())).to_vec();
-    let scene = Scene::from_source(&builtin(name).unwrap(), &LoadOptions { defines }).unwrap();
-    let world = World::new(&scene);
-    (scene, world)
+    Scene::from_source(&builtin(name).unwrap(), &LoadOptions { defines }).unwrap()
 }
 
-fn options(integrator: IntegratorKind, threads: usize) -> RenderOptions {
-    RenderOptions { method: Method::None, integrator, spp: Some(3), threads: Some(threads), ..RenderOptions::default() }
+fn prepared(scene: Scene, method: Method) -> PreparedScene {
+    let options = PrepareOptions { voxel_size: Some(16.0), ..PrepareOptions::with_method(method) };
+    PreparedScene::new(scene, &options, &Quiet).unwrap()
 }
 
-const RAYMARCH: IntegratorKind = IntegratorKind::Raymarch { samples_per_segment: 5 };
+fn plain(name: &str, size: &str) -> PreparedScene {
+    prepared(scene(name, size), Method::NONE)
+}
+
+fn options(integrator: Integrator, threads: usize) -> RenderOptions {
+    RenderOptions { integrator, spp: Some(3), threads: Some(threads), ..RenderOptions::default() }
+}
+
+const RAYMARCH: Integrator = Integrator::raymarch(5);
 
 #[test]
 fn all_paths_ask_what_the_render_asks() {
-    let (scene, world) = scene("cbox_vol3", "21");
-    for integrator in [IntegratorKind::Volpath, RAYMARCH] {
+    let prepared = plain("cbox_vol3", "21");
+    for integrator in [Integrator::Volpath, RAYMARCH] {
         let options = options(integrator, 2);
-        let stream = record_queries(&scene, &world, &options, u64::MAX, &Quiet).unwrap();
-        let statistics = render(&scene, &options, &Quiet).unwrap().statistics;
+        let stream = record_queries(&prepared, &options, u64::MAX, &Quiet).unwrap();
+        let statistics = prepared.render(&options, &Quiet).unwrap().statistics;
         assert_eq!(stream.queries.len() as u64, statistics.queries);
         assert_eq!(stream.spatial() as u64, statistics.spatial);
         assert_eq!((stream.origin.paths, stream.origin.paths_recorded), (3 * 21 * 21, 3 * 21 * 21));
@@ -54,9 +49,9 @@ fn all_paths_ask_what_the_render_asks() {
 /// A stream with a bound: some of the whole paths of the unbounded one, in its order, the same for any number of threads.
 #[test]
 fn a_bounded_stream_is_a_deterministic_part() {
-    let (scene, world) = scene("cbox_vol2", "40");
-    for integrator in [IntegratorKind::Volpath, RAYMARCH] {
-        let record = |n, threads| record_queries(&scene, &world, &options(integrator, threads), n, &Quiet).unwrap();
+    let prepared = plain("cbox_vol2", "40");
+    for integrator in [Integrator::Volpath, RAYMARCH] {
+        let record = |n, threads| record_queries(&prepared, &options(integrator, threads), n, &Quiet).unwrap();
         let all = record(u64::MAX, 2);
         let mut before = 0;
         for n in [1_u64, 100, 2000, 10_000] {
@@ -85,8 +80,8 @@ fn a_bounded_stream_is_a_deterministic_part() {
 fn a_file_is_read_as_it_was_written() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("a.vdfq");
-    let (scene, world) = scene("cbox_vol3", "8");
-    let mut stream = record_queries(&scene, &world, &options(RAYMARCH, 1), 500, &Quiet).unwrap();
+    let prepared = plain("cbox_vol3", "8");
+    let mut stream = record_queries(&prepared, &options(RAYMARCH, 1), 500, &Quiet).unwrap();
     stream.queries[0].from.x = -0.0;
     stream.queries[1].to.y = f64::MIN_POSITIVE / 4.0;
     for stream in [&stream, &QueryStream { queries: vec![], unoccluded: vec![], ..stream.clone() }] {
@@ -96,19 +91,30 @@ fn a_file_is_read_as_it_was_written() {
         assert_eq!(&read, stream);
         let bits = |s: &QueryStream| s.queries.iter().map(|q| q.from.to_array().map(f64::to_bits)).collect::<Vec<_>>();
         assert_eq!(bits(&read), bits(stream));
-        read.check_scene(&path, &scene, &world).unwrap();
+        read.check_scene(&path, &prepared).unwrap();
     }
-    let (other, other_world) = self::scene("cbox_vol2", "8");
-    let error = stream.check_scene(&path, &other, &other_world).unwrap_err().to_string();
-    assert!(error.contains("a.vdfq: recorded in another scene, of 30 triangles and 2 emitters"), "{error}");
+    let refused = |other: &PreparedScene, part: &str| {
+        let error = stream.check_scene(&path, other).unwrap_err().to_string();
+        assert!(error.contains("a.vdfq: recorded in") && error.contains(part), "{error}");
+    };
+    refused(&plain("cbox_vol2", "8"), "another scene, of 30 triangles and 2 emitters");
+    // The queries of a light that has moved go to another place: that is no wrong answer, but another scene.
+    let mut moved = scene("cbox_vol3", "8");
+    if let Emitter::Point { position, .. } = &mut moved.emitters[0] {
+        position.x += 1.0;
+    }
+    refused(&self::prepared(moved, Method::NONE), "other lights, media, materials or camera");
+    let mut bent = scene("cbox_vol3", "8");
+    bent.surfaces[0].triangles[0].vertices[0].x += 1.0;
+    refused(&self::prepared(bent, Method::NONE), "whose triangles lie elsewhere");
 }
 
 #[test]
 fn a_damaged_file_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("a.vdfq");
-    let (scene, world) = scene("cbox_vol2", "8");
-    let stream = record_queries(&scene, &world, &options(RAYMARCH, 1), 50, &Quiet).unwrap();
+    let prepared = plain("cbox_vol2", "8");
+    let stream = record_queries(&prepared, &options(RAYMARCH, 1), 50, &Quiet).unwrap();
     stream.write(&path).unwrap();
     let good = std::fs::read(&path).unwrap();
     let read = |bytes: &[u8]| {
@@ -130,7 +136,7 @@ fn a_damaged_file_is_refused() {
         changed
     };
     refused(&changed(0, b"x"), "not a file of queries");
-    refused(&changed(8, &[2]), "version 2 of the format");
+    refused(&changed(8, &[9]), "version 9 of the format");
     refused(&changed(16, &u64::MAX.to_le_bytes()), "does not fit 18446744073709551615 queries");
     refused(&changed(80, &f64::NAN.to_le_bytes()), "query 0 makes no sense");
     refused(&changed(80 + 24, &f64::INFINITY.to_le_bytes()), "query 0 makes no sense");
@@ -146,13 +152,13 @@ fn a_damaged_file_is_refused() {
 
 #[test]
 fn a_replay_measures_all_methods() {
-    let (scene, world) = scene("cbox_vol2", "12");
-    let stream = record_queries(&scene, &world, &options(RAYMARCH, 2), 5000, &Quiet).unwrap();
+    let prepared = plain("cbox_vol2", "12");
+    let stream = record_queries(&prepared, &options(RAYMARCH, 2), 5000, &Quiet).unwrap();
     let options =
         ReplayOptions { voxel_sizes: vec![16.0, 40.0], passes: 2, threads: Some(2), ..ReplayOptions::default() };
-    let r = replay(&scene, &world, &stream, &options, &Quiet).unwrap();
+    let r = replay(&prepared, &stream, &options, &Quiet).unwrap();
     assert_eq!((r.queries, r.spatial), (stream.queries.len(), stream.spatial()));
-    assert_eq!(r.methods.len(), 2 * (Method::ALL.len() - 1));
+    assert_eq!(r.methods.len(), 2 * (Method::proving().count()));
     for t in [r.t_loop, r.hierarchy.t_spatial, r.timer.t_spatial, r.timer.said, r.hierarchy.t_superficial.unwrap()] {
         assert!(0.0 < t.min && t.min <= t.median && t.median <= t.max, "{t:?}");
     }
@@ -171,12 +177,12 @@ fn a_replay_measures_all_methods() {
     assert!(proved("amr", 16.0) > proved("ndf", 16.0));
 
     let fails = |options: ReplayOptions, part: &str| {
-        let error = replay(&scene, &world, &stream, &options, &Quiet).unwrap_err().to_string();
+        let error = replay(&prepared, &stream, &options, &Quiet).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     };
-    fails(ReplayOptions { passes: 0, ..options.clone() }, "--passes must be at least 1");
-    fails(ReplayOptions { methods: vec![Method::None], ..options.clone() }, "--methods must name a method");
-    fails(ReplayOptions { voxel_sizes: vec![8.0, -1.0], ..options.clone() }, "--voxel must be a positive");
+    fails(ReplayOptions { passes: 0, ..options.clone() }, "passes must be at least 1");
+    fails(ReplayOptions { methods: vec![Method::NONE], ..options.clone() }, "methods must name a method");
+    fails(ReplayOptions { voxel_sizes: vec![8.0, -1.0], ..options.clone() }, "voxel must be a positive");
     let superficial = QueryStream {
         queries: stream.queries.iter().filter(|q| q.kind != QueryKind::Spatial).copied().collect(),
         unoccluded: stream
@@ -188,68 +194,29 @@ fn a_replay_measures_all_methods() {
             .collect(),
         ..stream.clone()
     };
-    let error = replay(&scene, &world, &superficial, &options, &Quiet).unwrap_err();
-    assert!(matches!(error, RenderError::NoQueries { .. }), "{error}");
-}
-
-/// A method that lies about one query only.
-struct Liar<'a, P> {
-    honest: &'a P,
-    about: DVec3,
-}
-
-impl<P: Proofs> Proofs for Liar<'_, P> {
-    fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
-        if from == self.about { Answer::Unoccluded } else { self.honest.answer(emitter, from, to) }
-    }
-
-    fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
-        self.honest.answer_between(a, b)
-    }
-}
-
-struct CheckLiar<'a> {
-    world: &'a World,
-    stream: &'a QueryStream,
-    about: usize,
-}
-
-impl ProofsVisitor for CheckLiar<'_> {
-    type Output = Result<u64, usize>;
-
-    fn visit<P: Proofs>(self, proofs: &P) -> Self::Output {
-        let liar = Liar { honest: proofs, about: self.stream.queries[self.about].from };
-        Check { bvh: &self.world.bvh, queries: &self.stream.queries, truth: &self.stream.unoccluded }.visit(&liar)
-    }
+    let error = replay(&prepared, &superficial, &options, &Quiet).unwrap_err();
+    assert!(matches!(error, LabError::NoQueries { .. }), "{error}");
 }
 
 #[test]
 fn every_single_wrong_answer_is_found() {
-    let (scene, world) = scene("cbox_vol2", "12");
-    let stream = record_queries(&scene, &world, &options(RAYMARCH, 2), 9000, &Quiet).unwrap();
-    let method = Method::Field(FieldKind::Amr, NeighbourhoodKind::Safe);
-    let (acceleration, _) =
-        Acceleration::build(method, &world.triangles, world.bounds, &scene.light_shapes(), 16.0, 1 << 20).unwrap();
-    let classes = |spatial, unoccluded| {
-        let queries = stream.queries.iter().zip(&stream.unoccluded).enumerate();
-        queries.filter(move |(_, (q, u))| (q.kind == QueryKind::Spatial, **u) == (spatial, unoccluded)).map(|(i, _)| i)
-    };
-    let lies: Vec<usize> = classes(true, false).step_by(50).chain(classes(true, false).next_back()).collect();
-    assert!(lies.len() > 3 && lies.last() > Some(&4096), "beyond the first block: {lies:?}");
-    for about in lies {
-        assert_eq!(acceleration.accept(CheckLiar { world: &world, stream: &stream, about }), Err(about));
-    }
-    // What is true anyway is no lie, and of superficial queries no proof is asked.
-    for about in [classes(true, true).next(), classes(false, false).next()].into_iter().flatten() {
-        assert!(acceleration.accept(CheckLiar { world: &world, stream: &stream, about }).is_ok());
+    let prepared = self::prepared(scene("cbox_vol2", "12"), "amr-sn".parse().unwrap());
+    let stream = record_queries(&prepared, &options(RAYMARCH, 2), 9000, &Quiet).unwrap();
+    assert!(stream.queries.len() > 4096, "more than a block");
+    let asked = |truth: &[bool]| check(&prepared.visibility(), &stream.queries, truth);
+    assert!(asked(&stream.unoccluded).is_ok_and(|proved| proved > 100));
+    for wrong in (0..stream.queries.len()).step_by(97).chain([4095, 4096, stream.queries.len() - 1]) {
+        let mut truth = stream.unoccluded.clone();
+        truth[wrong] ^= true;
+        assert_eq!(asked(&truth), Err(wrong));
     }
 
     // A stream whose answers are not those of the hierarchy.
     let mut forged = stream.clone();
     forged.unoccluded[17] ^= true;
-    let options = ReplayOptions { methods: vec![method], passes: 1, ..ReplayOptions::default() };
-    match replay(&scene, &world, &forged, &options, &Quiet) {
-        Err(RenderError::WrongAnswer(w)) => {
+    let options = ReplayOptions { methods: vec![Method::default()], passes: 1, ..ReplayOptions::default() };
+    match replay(&prepared, &forged, &options, &Quiet) {
+        Err(LabError::WrongAnswer(w)) => {
             assert_eq!(
                 (w.method, w.index, w.query, w.unoccluded),
                 ("none", 17, stream.queries[17], stream.unoccluded[17])
@@ -263,18 +230,18 @@ fn every_single_wrong_answer_is_found() {
 fn triangles_are_written_as_documented() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("triangles.bin");
-    let (scene, world) = scene("cbox_vol2", "4");
-    write_triangles(&path, &world.triangles).unwrap();
+    let prepared = plain("cbox_vol2", "4");
+    write_triangles(&path, &prepared.world().triangles).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let u32_at = |i: usize| u32::from_le_bytes(bytes[i..i + 4].try_into().unwrap());
     assert_eq!((&bytes[..8], u32_at(8), u32_at(12)), (&b"VDFTRIAN"[..], 1, 32));
     assert_eq!(
         (u32_at(16) as usize, u32_at(20), bytes.len()),
-        (world.triangles.len(), 0, 32 + 36 * world.triangles.len())
+        (prepared.world().triangles.len(), 0, 32 + 36 * prepared.world().triangles.len())
     );
     assert_eq!(u32_at(24), crc32fast::hash(&bytes[32..]));
-    let stream = record_queries(&scene, &world, &options(RAYMARCH, 1), 10, &Quiet).unwrap();
+    let stream = record_queries(&prepared, &options(RAYMARCH, 1), 10, &Quiet).unwrap();
     assert_eq!(stream.origin.triangles_crc32, u32_at(24));
-    let last = world.triangles.last().unwrap().vertices[2];
+    let last = prepared.world().triangles.last().unwrap().vertices[2];
     assert_eq!(u32_at(bytes.len() - 4), last.z.to_bits());
 }

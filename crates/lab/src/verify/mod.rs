@@ -18,9 +18,13 @@ mod segments;
 #[cfg(test)]
 mod tests;
 
-use std::{array, time::Instant};
+use std::{array, sync::Arc, time::Instant};
 
 use rayon::prelude::*;
+use vdf_geometry::Bounds;
+use vdf_render::{PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads};
+use vdf_scene::Scene;
+use vdf_visibility::{Answer, Method, Provers, QueryKind, ShadowQuery};
 use vdf_voxel::{VoxelGrid, voxelize};
 
 use self::{
@@ -31,11 +35,7 @@ pub use self::{
     report::{Checks, ClassTally, Failure, GridSummary, MethodTally, Tally, VerifyReport},
     segments::SegmentClass,
 };
-use crate::{
-    Acceleration, Answer, Method, Progress, Proofs, ProofsVisitor, RenderError, World,
-    options::{check_voxel_size, default_voxel_size, fail, on_threads},
-    scene::Scene,
-};
+use crate::LabError;
 
 /// Segments that are made, asked about and checked in one go.
 const BLOCK: u64 = 4096;
@@ -44,14 +44,14 @@ const BLOCK: u64 = 4096;
 const TOLD: usize = 20;
 
 /// A claim of each has one bit.
-const MOST_METHODS: usize = 32;
+const MAX_METHODS: usize = 32;
 
 const CLASSES: usize = SegmentClass::ALL.len();
 
 /// What to verify.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VerifyOptions {
-    /// The methods, all asked about the same segments; at least one, and not [`Method::None`], which proves nothing.
+    /// The methods, all asked about the same segments; at least one, and not [`Method::NONE`], which proves nothing.
     pub methods: Vec<Method>,
     /// Sides of voxels in world units, between which the segments are divided; if empty a 128th of the scene's longest side.
     pub voxel_sizes: Vec<f64>,
@@ -69,7 +69,7 @@ impl Default for VerifyOptions {
     /// A million segments, all methods, at most 2²⁷ voxels.
     fn default() -> Self {
         Self {
-            methods: Method::ALL.into_iter().filter(|&m| m != Method::None).collect(),
+            methods: Method::proving().collect(),
             voxel_sizes: vec![],
             segments: 1_000_000,
             seed: 0,
@@ -84,17 +84,17 @@ impl VerifyOptions {
     ///
     /// # Errors
     /// [`RenderError::Option`] names the option and what it has to be.
-    pub fn validate(&self) -> Result<(), RenderError> {
+    pub fn validate(&self) -> Result<(), LabError> {
         if self.segments == 0 {
-            return fail("segments", "must be at least 1".into());
+            return Err(LabError::option("segments", "must be at least 1"));
         }
-        if self.methods.is_empty() || self.methods.contains(&Method::None) {
-            return fail("method", "must name methods that prove something; none does not".into());
+        if self.methods.is_empty() || self.methods.contains(&Method::NONE) {
+            return Err(LabError::option("method", "must name methods that prove something; none does not"));
         }
-        if self.methods.len() > MOST_METHODS {
-            return fail("method", format!("must name at most {MOST_METHODS} methods"));
+        if self.methods.len() > MAX_METHODS {
+            return Err(LabError::option("method", format!("must name at most {MAX_METHODS} methods")));
         }
-        self.voxel_sizes.iter().try_for_each(|&size| check_voxel_size(size))
+        Ok(self.voxel_sizes.iter().try_for_each(|&size| check_voxel_size(size))?)
     }
 }
 
@@ -104,21 +104,26 @@ impl VerifyOptions {
 ///
 /// # Errors
 /// If an option or a voxel size is not usable, or `progress` asks to stop.
-pub fn verify(scene: &Scene, options: &VerifyOptions, progress: &dyn Progress) -> Result<VerifyReport, RenderError> {
+pub fn verify(
+    scene: impl Into<Arc<Scene>>,
+    options: &VerifyOptions,
+    progress: &dyn Progress,
+) -> Result<VerifyReport, LabError> {
     options.validate()?;
-    on_threads(options.threads, || verify_in_pool(scene, options, progress))
+    let none = PrepareOptions { threads: options.threads, ..PrepareOptions::with_method(Method::NONE) };
+    let prepared = PreparedScene::new(scene, &none, progress)?;
+    on_threads(options.threads, || verify_in_pool(&prepared, options, progress))
 }
 
 fn verify_in_pool(
-    scene: &Scene,
+    prepared: &PreparedScene,
     options: &VerifyOptions,
     progress: &dyn Progress,
-) -> Result<VerifyReport, RenderError> {
-    progress.phase("hierarchy");
-    let world = World::new(scene);
-    let oracle = Oracle::new(&world);
+) -> Result<VerifyReport, LabError> {
+    let world = prepared.world();
+    let oracle = Oracle::new(world);
     let sizes = match options.voxel_sizes.as_slice() {
-        [] => vec![default_voxel_size(world.bounds)],
+        [] => vec![default_voxel_size(&world.bounds)],
         sizes => sizes.to_vec(),
     };
     let names: Vec<_> = options.methods.iter().map(|m| m.name()).collect();
@@ -129,20 +134,24 @@ fn verify_in_pool(
     let mut seconds = 0.0;
     for (number, &voxel_size) in (0u32..).zip(&sizes) {
         progress.phase("distance fields");
-        let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, voxel_size, options.max_voxels)?;
+        let grid = grid_over(&world.bounds, voxel_size, options.max_voxels)?;
         let vertices = world.triangles.par_iter().map(|t| t.vertices);
         let occupied = voxelize(&grid, vertices.clone())?;
         let excess = occupied.validate(&grid, vertices)?;
         let mut methods = Vec::new();
         for &method in &options.methods {
             if progress.cancelled() {
-                return Err(RenderError::Cancelled);
+                return Err(RenderError::Cancelled.into());
             }
-            let (triangles, lights) = (&world.triangles, &scene.light_shapes());
-            let (acceleration, _) =
-                Acceleration::build(method, triangles, world.bounds, lights, voxel_size, options.max_voxels)?;
-            acceleration.validate(&occupied)?;
-            methods.push(acceleration);
+            let options = PrepareOptions {
+                method: Some(method),
+                voxel_size: Some(voxel_size),
+                max_voxels: options.max_voxels,
+                threads: options.threads,
+            };
+            let with_method = prepared.with_options(&options, progress)?;
+            with_method.provers().validate(&occupied)?;
+            methods.push(with_method);
         }
         let r = grid.resolution();
         let free_share = 1.0 - occupied.count() as f64 / r.voxel_count() as f64;
@@ -152,9 +161,9 @@ fn verify_in_pool(
         let start = Instant::now();
         let [from, to] = [number, number + 1].map(|n| part(options.segments, n.into(), sizes.len() as u64));
         let run = Run {
-            claimants: methods.iter().map(|m| m as &dyn Claimant).collect(),
+            claimants: methods.iter().map(|m| m.provers() as &dyn Claimant).collect(),
             names: &names,
-            generator: Generator::new(scene, &world, grid, options.seed, number),
+            generator: Generator::new(prepared.scene(), world, grid, options.seed, number),
             oracle: &oracle,
             voxel_size,
         };
@@ -179,6 +188,10 @@ fn verify_in_pool(
     })
 }
 
+fn grid_over(bounds: &Bounds, voxel_size: f64, max_voxels: u64) -> Result<VoxelGrid, LabError> {
+    Ok(VoxelGrid::covering(bounds.min, bounds.max, voxel_size, max_voxels)?)
+}
+
 /// The first of `whole` things that belong to part `n` of `parts`.
 fn part(whole: u64, n: u64, parts: u64) -> u64 {
     // Exact even if the product has more than 64 bits.
@@ -192,42 +205,35 @@ struct Claims {
     occluded: u32,
 }
 
+impl Claims {
+    fn add(&mut self, answer: Answer, bit: u32) {
+        match answer {
+            Answer::Unoccluded => self.unoccluded |= 1 << bit,
+            Answer::Occluded => self.occluded |= 1 << bit,
+            Answer::Unknown => {}
+        }
+    }
+}
+
 /// Whoever is asked about blocks of segments: one virtual call a block.
 trait Claimant: Sync {
     /// Sets bit `bit` of what is claimed of each of `queries`.
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32);
 }
 
-impl<P: Proofs> Claimant for P {
+impl Claimant for Provers {
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
         for (query, claims) in queries.iter().zip(claims) {
-            let (p, q) = (query.segment.p, query.segment.q);
+            let (from, to) = (query.segment.p, query.segment.q);
             // A query towards an emitter may have an answer of its own; the one for any two points has to be right as well.
-            let of_emitter = query.emitter.map(|e| [self.answer(e, p, q), self.answer_on_light(e, p, q)]);
-            for answer in of_emitter.into_iter().flatten().chain([self.answer_between(p, q)]) {
-                match answer {
-                    Answer::Unoccluded => claims.unoccluded |= 1 << bit,
-                    Answer::Occluded => claims.occluded |= 1 << bit,
-                    Answer::Unknown => {}
-                }
+            let of_emitter = query.emitter.map(|emitter| {
+                [QueryKind::Spatial, QueryKind::OnLight]
+                    .map(|kind| self.answer(&ShadowQuery { from, to, emitter, kind }))
+            });
+            for answer in of_emitter.into_iter().flatten().chain([self.answer_between(from, to)]) {
+                claims.add(answer, bit);
             }
         }
-    }
-}
-
-impl Claimant for Acceleration {
-    fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
-        struct Claim<'a>(&'a [Query], &'a mut [Claims], u32);
-
-        impl ProofsVisitor for Claim<'_> {
-            type Output = ();
-
-            fn visit<P: Proofs>(self, proofs: &P) {
-                proofs.claim(self.0, self.1, self.2);
-            }
-        }
-
-        self.accept(Claim(queries, claims, bit));
     }
 }
 

@@ -1,11 +1,7 @@
 //! What is true of a segment: the loop over all triangles, and the hierarchy.
 
-use glam::DVec3;
-
-use crate::{
-    Triangle, World,
-    geometry::{Segment, intersect_exact},
-};
+use vdf_geometry::{Bounds, Segment, intersect_exact};
+use vdf_render::World;
 
 /// The loop is run on every segment up to this many triangles; beyond, on a share of the segments such that it costs no more.
 const TRIANGLES_PER_SEGMENT: u64 = 256;
@@ -18,7 +14,7 @@ const UNPROVED: u64 = 16;
 pub(super) struct Oracle<'a> {
     world: &'a World,
     /// Bounds of each triangle.
-    bounds: Vec<(DVec3, DVec3)>,
+    bounds: Vec<Bounds>,
     /// The loop is run on one segment in so many.
     every: u64,
 }
@@ -43,13 +39,9 @@ impl Truth {
 
 impl<'a> Oracle<'a> {
     pub(super) fn new(world: &'a World) -> Self {
-        let bounds = |t: &Triangle| {
-            let [a, b, c] = t.vertices_f64();
-            (a.min(b).min(c), a.max(b).max(c))
-        };
         Self {
             world,
-            bounds: world.triangles.iter().map(bounds).collect(),
+            bounds: world.triangles.iter().map(|t| Bounds::of_triangles([t])).collect(),
             every: (world.triangles.len() as u64).div_ceil(TRIANGLES_PER_SEGMENT).max(1),
         }
     }
@@ -62,12 +54,10 @@ impl<'a> Oracle<'a> {
         Truth { by_hierarchy, by_loop }
     }
 
-    /// The slow twin of [`crate::geometry::Bvh::occluded`]: exact predicates on every triangle. Only those are skipped
+    /// The slow twin of [`vdf_geometry::Bvh::occluded`]: exact predicates on every triangle. Only those are skipped
     /// whose bounds and the segment's are apart on an axis, which is a comparison of exact numbers.
     fn occluded_by_any(&self, segment: &Segment) -> bool {
-        let (min, max) = (segment.p.min(segment.q), segment.p.max(segment.q));
-        let apart = |(low, high): &(DVec3, DVec3)| high.cmplt(min).any() || low.cmpgt(max).any();
         let all = self.bounds.iter().zip(&self.world.triangles);
-        all.filter(|(bounds, _)| !apart(bounds)).any(|(_, t)| intersect_exact(segment, t).is_some())
+        all.filter(|(bounds, _)| !bounds.misses(segment)).any(|(_, t)| intersect_exact(segment, t).is_some())
     }
 }

@@ -10,9 +10,11 @@
 
 use glam::DVec3;
 use serde::Serialize;
+use vdf_geometry::{Bounds, Segment, Triangle};
+use vdf_render::{Sampler, World, light_shapes};
+use vdf_scene::Scene;
+use vdf_visibility::LightShape;
 use vdf_voxel::VoxelGrid;
-
-use crate::{LightShape, Sampler, Triangle, World, geometry::Segment, scene::Scene};
 
 /// Where the ends of a segment come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -104,7 +106,7 @@ pub(super) struct Generator<'a> {
 impl<'a> Generator<'a> {
     pub(super) fn new(scene: &Scene, world: &'a World, grid: VoxelGrid, seed: u64, number: u32) -> Self {
         let mut lights = Vec::new();
-        for (i, shape) in scene.light_shapes().iter().enumerate() {
+        for (i, shape) in light_shapes(scene).iter().enumerate() {
             match shape {
                 LightShape::Point(position) => lights.push((i, *position)),
                 // Vertices and middles, as sampled points are: on the light, or a little beside it.
@@ -278,7 +280,7 @@ impl<'a> Generator<'a> {
     }
 
     fn uniform(&self, draw: &mut Draw) -> DVec3 {
-        let (min, max) = self.world.bounds;
+        let Bounds { min, max } = self.world.bounds;
         min + (max - min) * DVec3::from_array([(); 3].map(|()| draw.unit()))
     }
 
@@ -353,7 +355,7 @@ impl<'a> Generator<'a> {
 
     /// On the border of the bounds or of the grid, or outside: near, far and absurdly far.
     fn outside(&self, draw: &mut Draw) -> DVec3 {
-        let (min, max) = self.world.bounds;
+        let Bounds { min, max } = self.world.bounds;
         let mut p = self.uniform(draw);
         if draw.chance(0.4) {
             let axis = draw.pick(3);

@@ -1,14 +1,14 @@
 //! Liars must be caught, and what is asked must not depend on threads.
 
 use glam::{DMat4, DVec3, Vec3};
+use vdf_geometry::{Segment, Triangle};
+use vdf_render::World;
+use vdf_scene::{
+    Bsdf, Emitter, FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect, ReconstructionFilter, Rgb, Surface,
+};
+use vdf_visibility::VisibilityError;
 
 use super::*;
-use crate::{
-    NoProofs, Rgb, Triangle,
-    scene::{
-        Bsdf, Emitter, FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect, ReconstructionFilter, Surface,
-    },
-};
 
 /// A wall across the unit cube, which is as bright as day on both sides.
 fn scene() -> Scene {
@@ -63,29 +63,39 @@ enum Liar {
     AboutEmitter1(Box<World>),
 }
 
-impl Proofs for Liar {
-    fn answer(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
+impl Liar {
+    fn answer(&self, query: &Query) -> Answer {
         match self {
-            Self::AboutEmitter1(_) if emitter == 1 => Answer::Unoccluded,
-            _ => self.answer_between(from, to),
+            Self::Always(answer) => *answer,
+            Self::AboutEmitter1(_) if query.emitter == Some(1) => Answer::Unoccluded,
+            Self::AboutEmitter1(w) => self.truth(w, &query.segment),
         }
     }
 
-    fn answer_between(&self, a: DVec3, b: DVec3) -> Answer {
-        match self {
-            Self::Always(answer) => *answer,
-            Self::AboutEmitter1(w) if w.bvh.occluded(&crate::geometry::Segment::new(a, b)) => Answer::Occluded,
-            Self::AboutEmitter1(_) => Answer::Unoccluded,
+    fn truth(&self, world: &World, segment: &Segment) -> Answer {
+        if world.bvh.occluded(segment) { Answer::Occluded } else { Answer::Unoccluded }
+    }
+}
+
+impl Claimant for Liar {
+    fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
+        for (query, claims) in queries.iter().zip(claims) {
+            claims.add(self.answer(query), bit);
+            // What is right about the two points, as provers say it beside the emitter's own answer.
+            if let Self::AboutEmitter1(world) = self {
+                claims.add(self.truth(world, &query.segment), bit);
+            }
         }
     }
 }
 
-fn asked(proofs: &Liar, segments: u64) -> Sum {
+fn asked(liar: &Liar, segments: u64) -> Sum {
     let scene = scene();
     let world = World::new(&scene);
-    let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, 0.125, 1 << 20).unwrap();
+    let grid = grid_over(&world.bounds, 0.125, 1 << 20).unwrap();
+    let none = Provers::none();
     let run = Run {
-        claimants: vec![&NoProofs, proofs],
+        claimants: vec![&none, liar],
         names: &["none", "liar"],
         generator: Generator::new(&scene, &world, grid, 3, 0),
         oracle: &Oracle::new(&world),
@@ -154,7 +164,7 @@ fn the_report_does_not_depend_on_threads() {
     let report = |threads| {
         let voxel_sizes = vec![0.125, 0.1];
         let options = VerifyOptions { voxel_sizes, segments: 55_001, threads: Some(threads), ..Default::default() };
-        let report = verify(&scene(), &options, &Quiet(false)).unwrap();
+        let report = verify(scene(), &options, &Quiet(false)).unwrap();
         VerifyReport { seconds: 0.0, threads: 0, ..report }
     };
     let one = report(1);
@@ -172,7 +182,7 @@ fn a_share_of_the_proofs_goes_through_the_loop_if_triangles_are_many() {
     let wall = scene.surfaces[0].triangles.clone();
     scene.surfaces[0].triangles = wall.repeat(500);
     let options = VerifyOptions { segments: 100_000, ..Default::default() };
-    let report = verify(&scene, &options, &Quiet(false)).unwrap();
+    let report = verify(scene, &options, &Quiet(false)).unwrap();
     assert_eq!(report.checks.proved_by_hierarchy, report.total.proved);
     // 1000 triangles: one in ceil(1000/256).
     let share = report.checks.proved_by_loop as f64 / report.total.proved as f64;
@@ -185,21 +195,21 @@ fn bad_options_and_a_wish_to_stop_are_errors() {
     let with = |change: fn(&mut VerifyOptions)| {
         let mut options = VerifyOptions { segments: 1000, ..Default::default() };
         change(&mut options);
-        verify(&scene(), &options, &Quiet(false)).map(drop)
+        verify(scene(), &options, &Quiet(false)).map(drop)
     };
-    let option = |r: Result<(), RenderError>| match r {
-        Err(RenderError::Option { option, .. }) => option,
+    let option = |r: Result<(), LabError>| match r {
+        Err(LabError::Render(RenderError::Option { option, .. })) => option,
         other => panic!("{other:?}"),
     };
     assert_eq!(option(with(|o| o.segments = 0)), "segments");
     assert_eq!(option(with(|o| o.methods.clear())), "method");
-    assert_eq!(option(with(|o| o.methods.push(Method::None))), "method");
+    assert_eq!(option(with(|o| o.methods.push(Method::NONE))), "method");
     assert_eq!(option(with(|o| o.methods = vec![Method::default(); 33])), "method");
     assert_eq!(option(with(|o| o.threads = Some(0))), "threads");
     assert_eq!(option(with(|o| o.voxel_sizes = vec![0.1, -1.0])), "voxel");
-    assert!(matches!(with(|o| o.voxel_sizes = vec![1e-9]), Err(RenderError::Voxel(_))));
+    assert!(matches!(with(|o| o.voxel_sizes = vec![1e-9]), Err(LabError::Visibility(VisibilityError::Voxel(_)))));
     let options = VerifyOptions::default();
-    assert!(matches!(verify(&scene(), &options, &Quiet(true)), Err(RenderError::Cancelled)));
+    assert!(matches!(verify(scene(), &options, &Quiet(true)), Err(LabError::Render(RenderError::Cancelled))));
 }
 
 /// Every class must reach the cases that it is for: this counts them.
@@ -207,7 +217,7 @@ fn bad_options_and_a_wish_to_stop_are_errors() {
 fn classes_are_what_they_say() {
     let scene = scene();
     let world = World::new(&scene);
-    let grid = VoxelGrid::covering(world.bounds.0, world.bounds.1, 0.125, 1 << 20).unwrap();
+    let grid = grid_over(&world.bounds, 0.125, 1 << 20).unwrap();
     let generator = Generator::new(&scene, &world, grid, 0, 0);
     let count =
         |class, wanted: &dyn Fn(&Query) -> bool| (0..2000).filter(|&i| wanted(&generator.query(class, i))).count();
