@@ -1,6 +1,5 @@
 //! The command line as typed.
 
-
 use std::{path::PathBuf, str::FromStr};
 
 use clap::{

@@ -22,7 +22,9 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
             let path = if image == "image" { &args.a } else { &args.b };
             Failure::Usage(anyhow!("cannot compare: {} {reason}", path.display()))
         }
-        e @ ImageError::PixelsPerDegree { .. } => Failure::Usage(anyhow!("--ppd: {e}")),
+        ImageError::PixelsPerDegree { value } => {
+            Failure::Usage(anyhow!("--ppd must be from 1 to 1000 pixels, not {value}"))
+        }
         e => e.into(),
     })?;
     if let Some(map) = &args.map {

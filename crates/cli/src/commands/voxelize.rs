@@ -25,11 +25,8 @@ pub(crate) fn run(args: &VoxelizeArgs) -> Result<(), Failure> {
         say(format_args!("warning: {warning}"));
     }
     let reporter = Reporter::new(true)?;
-    let options = PrepareOptions {
-        voxel_size: args.voxel,
-        threads: args.threads,
-        ..PrepareOptions::with_method(args.method)
-    };
+    let options =
+        PrepareOptions { voxel_size: args.voxel, threads: args.threads, ..PrepareOptions::with_method(args.method) };
     let voxels = SceneVoxels::build(scene, &options, &reporter)?;
 
     let mut written = Vec::new();

@@ -10,7 +10,9 @@ use std::{fmt, hint::black_box, time::Instant};
 use rayon::prelude::*;
 use serde::Serialize;
 use vdf_geometry::Segment;
-use vdf_render::{PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads};
+use vdf_render::{
+    PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
+};
 use vdf_visibility::{Answer, Counters, Method, Provers, QueryKind, ShadowQuery, Visibility};
 
 use super::stream::QueryStream;
@@ -231,8 +233,7 @@ impl<'a> Replaying<'a> {
     /// Asks the hierarchy once about all queries.
     fn new(prepared: &'a PreparedScene, stream: &'a QueryStream, progress: &'a dyn Progress) -> Result<Self, LabError> {
         let bvh = &prepared.world().bvh;
-        let truth: Vec<bool> =
-            stream.queries.par_iter().map(|q| !bvh.occluded(&Segment::new(q.from, q.to))).collect();
+        let truth: Vec<bool> = stream.queries.par_iter().map(|q| !bvh.occluded(&Segment::new(q.from, q.to))).collect();
         if let Some(index) = truth.iter().zip(&stream.unoccluded).position(|(a, b)| a != b) {
             return Err(wrong(Method::NONE, None, index, stream.queries[index], truth[index]));
         }
