@@ -10,7 +10,7 @@ use std::{fmt, hint::black_box, time::Instant};
 use rayon::prelude::*;
 use serde::Serialize;
 use vdf_geometry::Segment;
-use vdf_render::{
+use vdf_render::{GridExtent, 
     PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
 };
 use vdf_visibility::{Answer, Counters, Method, Provers, QueryKind, ShadowQuery, Visibility};
@@ -25,6 +25,8 @@ pub struct ReplayOptions {
     pub methods: Vec<Method>,
     /// Sides of voxels in world units; if empty a 128th of the scene's longest side.
     pub voxel_sizes: Vec<f64>,
+    /// What the voxel grids cover.
+    pub grid: GridExtent,
     /// Passes over the stream that a median is taken of; at least 1.
     pub passes: u32,
     /// Number of threads that build and check; by default one for each processor. Queries are always timed on one.
@@ -36,7 +38,7 @@ pub struct ReplayOptions {
 impl Default for ReplayOptions {
     /// All methods, one voxel size, medians of five passes.
     fn default() -> Self {
-        Self { methods: Method::all().collect(), voxel_sizes: vec![], passes: 5, threads: None, max_voxels: 1 << 29 }
+        Self { methods: Method::all().collect(), voxel_sizes: vec![], grid: GridExtent::default(), passes: 5, threads: None, max_voxels: 1 << 29 }
     }
 }
 
@@ -253,7 +255,7 @@ impl<'a> Replaying<'a> {
 
     fn run(&self, options: &ReplayOptions) -> Result<Replay, LabError> {
         let sizes = match &options.voxel_sizes[..] {
-            [] => vec![default_voxel_size(&self.prepared.world().bounds)],
+            [] => vec![default_voxel_size(self.prepared.world().grid_bounds(options.grid))],
             sizes => sizes.to_vec(),
         };
         let mut methods: Vec<Method> = Vec::new();
@@ -291,6 +293,7 @@ impl<'a> Replaying<'a> {
         let options = PrepareOptions {
             method: Some(method),
             voxel_size: Some(size),
+            grid: options.grid,
             max_voxels: options.max_voxels,
             threads: options.threads,
         };
