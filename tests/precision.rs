@@ -38,7 +38,7 @@ fn length(s: &Segment) -> Big {
 }
 
 fn fog(sigma_t: f64, boundaries: &[Boundary]) -> Media {
-    Media::new(&[Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic }], boundaries)
+    Media::new(&[Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic }], boundaries, boundaries.is_empty().then_some(FOG))
 }
 
 const FOG: MediumId = MediumId(0);
@@ -90,10 +90,10 @@ fn transmittance_and_what_it_lacks_of_one() {
         let s = Segment::new(p, p + to * (tau / sigma_t));
         let exact = big(sigma_t) * length(&s);
         let media = fog(sigma_t, &[]);
-        let computed = media.optical_depth(&s, Some(FOG));
+        let computed = media.optical_depth(&s, &media.regions_at(s.p));
         let case = || format!("σ_t = {sigma_t}, {s:?}");
         depth.check(error(computed, &exact), 5.0, &case);
-        let transmittance = media.transmittance(&s, Some(FOG));
+        let transmittance = media.transmittance(&s, &media.regions_at(s.p));
         let minus = -exact;
         if tau < 690.0 {
             let t = match tau {
@@ -129,7 +129,7 @@ fn sampled_distances() {
         let exact = -(big(1.0) - big(xi)).ln() / (big(sigma_t) * length(&s));
         let media = fog(sigma_t, &[]);
         let case = || format!("σ_t = {sigma_t}, ξ = {xi}, {s:?}");
-        let FreeFlight::Collision { t, medium: FOG } = media.free_flight(&s, Some(FOG), tau) else {
+        let FreeFlight::Collision { t, medium: FOG, .. } = media.free_flight(&s, &media.regions_at(s.p), tau) else {
             panic!("{}", case())
         };
         bound.check(error(t, &exact), 8.0, &case);
@@ -229,7 +229,7 @@ fn crossings_at_any_angle() {
         let m = (dvec3(8.0, 10.0, 12.0) - p).abs().max((dvec3(-8.0, -6.0, -4.0) - p).abs()).max_element();
         let det = 256.0 * d.z.abs() / d.abs().max_element();
         let allowed = 5.0 * U * exact.to_f64().value() + sigma_t * 2048.0 * U * m * m * m / det;
-        let off = (big(media.optical_depth(&s, Some(FOG))) - exact).to_f64().value().abs();
+        let off = (big(media.optical_depth(&s, &media.regions_at(s.p))) - exact).to_f64().value().abs();
         bound.check(off, allowed, &|| format!("{s:?}, {:?}", bvh.intersect(&s)));
     }
 }
@@ -255,7 +255,7 @@ fn crossings_on_a_shared_edge() {
         let m = 17.0;
         let det = 256.0;
         let allowed = 5.0 * U * exact.to_f64().value() + sigma_t * 2048.0 * U * m * m * m / det;
-        let off = (big(media.optical_depth(&s, Some(FOG))) - exact).to_f64().value().abs();
+        let off = (big(media.optical_depth(&s, &media.regions_at(s.p))) - exact).to_f64().value().abs();
         bound.check(off, allowed, &|| format!("{s:?}"));
     }
 }

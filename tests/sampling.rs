@@ -125,7 +125,7 @@ fn slabs() -> Scene {
 fn free_flights_are_drawn_with_the_transmittance() {
     const CELLS: usize = 48;
     let scene = slabs();
-    let media = Media::new(&scene.media, &scene.boundaries);
+    let media = Media::of_scene(&scene);
     for (k, (p, q)) in [
         (dvec3(0.1, 0.2, 0.0), dvec3(0.3, -0.1, 12.0)),
         (dvec3(0.1, 0.2, 12.0), dvec3(-3.0, 1.0, 0.0)),
@@ -138,19 +138,19 @@ fn free_flights_are_drawn_with_the_transmittance() {
         let segment = Segment::new(p, q);
         let last = if k == 2 { 12e-9 } else { 1.0 };
         let border = |i: usize| last * i as f64 / CELLS as f64;
-        let t = |i: usize| media.transmittance(&Segment::new(p, segment.at(border(i))), None);
+        let t = |i: usize| media.transmittance(&Segment::new(p, segment.at(border(i))), &media.regions_at(p));
         let mut probabilities: Vec<_> = (0..CELLS).map(|i| t(i) - t(i + 1)).collect();
-        probabilities.push(media.transmittance(&segment, None));
+        probabilities.push(media.transmittance(&segment, &media.regions_at(segment.p)));
         let mut counts = vec![0; CELLS + 1];
         for i in 0..200_000 {
             let tau = -(-Sampler::new(31, i, k as u32, 0).next_1d()).ln_1p();
-            let cell = match media.free_flight(&segment, None, tau) {
-                FreeFlight::Collision { t, medium } => {
+            let cell = match media.free_flight(&segment, &media.regions_at(segment.p), tau) {
+                FreeFlight::Collision { t, medium, .. } => {
                     assert!(media.medium(medium).sigma_t > 0.0, "a collision in an empty medium");
                     ((t / last * CELLS as f64) as usize).min(CELLS - 1)
                 }
-                FreeFlight::Passed(medium) => {
-                    assert_eq!(medium, None, "outside again");
+                FreeFlight::Passed(regions) => {
+                    assert_eq!(media.medium_in(&regions), None, "outside again");
                     CELLS
                 }
             };
@@ -164,7 +164,7 @@ fn free_flights_are_drawn_with_the_transmittance() {
 #[test]
 fn short_flights_are_flights() {
     let scene = slabs();
-    let media = Media::new(&scene.media, &scene.boundaries);
+    let media = Media::of_scene(&scene);
     let medium = scene.boundaries[0].interior.expect("fog");
     let mut found = 0;
     for i in 0..20_000 {
@@ -175,7 +175,7 @@ fn short_flights_are_flights() {
         let tau = -(-u.next_1d()).ln_1p();
         if let Some(flight) = media.short_flight(&segment, medium, tau) {
             found += 1;
-            let FreeFlight::Collision { t, medium: there } = media.free_flight(&segment, Some(medium), tau) else {
+            let FreeFlight::Collision { t, medium: there, .. } = media.free_flight(&segment, &media.regions_at(segment.p), tau) else {
                 panic!("{segment:?}: no collision")
             };
             assert_eq!(there, medium);
@@ -223,7 +223,7 @@ const FROM: DVec3 = dvec3(0.5, 0.25, 2.0);
 const REACH: f64 = 1e3;
 
 fn light_samples(n: u32, salt: u32) -> impl Iterator<Item = vdf::render::LightSample> {
-    let lights = Lights::new(&lit(), REACH, 0.0);
+    let lights = Lights::new(&lit(), REACH);
     (0..n).map(move |i| {
         let mut u = Sampler::new(41, i, salt, 0);
         lights.sample(FROM, u.next_1d(), u.next_2d()).expect("all emitters face that point")
@@ -233,7 +233,7 @@ fn light_samples(n: u32, salt: u32) -> impl Iterator<Item = vdf::render::LightSa
 /// Each emitter is as likely as the others, and the constant one draws all directions alike.
 #[test]
 fn emitters_and_the_sky_are_drawn_evenly() {
-    let lights = Lights::new(&lit(), REACH, 0.0);
+    let lights = Lights::new(&lit(), REACH);
     assert!((lights.pdf_background() * 4.0 * PI * 5.0 - 1.0).abs() < 1e-15, "the density integrates to 1/5");
     let mut emitters = [0; 5];
     let mut sky = [0; 128];
@@ -311,7 +311,7 @@ fn solid_angle(triangle: &Triangle, from: DVec3) -> f64 {
 #[test]
 fn area_emitters_fill_their_solid_angle() {
     let scene = lit();
-    let lights = Lights::new(&scene, REACH, 0.0);
+    let lights = Lights::new(&scene, REACH);
     for (emitter, surface, radiance) in [(1, 0, 2.0), (3, 1, 3.0)] {
         let triangles = &scene.surfaces[surface].triangles;
         let expected: f64 =

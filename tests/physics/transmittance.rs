@@ -98,7 +98,7 @@ fn of_segments_is_that_of_clipping_to_slabs() {
             .zip(&fogs)
             .map(|(k, f)| Boundary { triangles: cuboid(f.min, f.max), interior: Some(MediumId(k)), exterior: None })
             .collect();
-        let media = Media::new(&media, &boundaries);
+        let media = Media::new(&media, &boundaries, None);
         for _ in 0..8 {
             let (a, b) = (random.point(), random.point());
             // The medium of a start on a boundary, or of a way along a common face, is a matter of taste.
@@ -115,14 +115,14 @@ fn of_segments_is_that_of_clipping_to_slabs() {
             let expected = optical_depth(&fogs, a, b);
             // Crossings within 2⁻⁴⁰ of the largest coordinate are one place; a box has at most two, sigma is at most 2.
             let tolerance = 4.0 * fogs.len() as f64 * 4.0 / (1_u64 << 40) as f64;
-            let tau = media.optical_depth(&segment, start);
+            let tau = media.optical_depth(&segment, &media.regions_at(segment.p));
             assert!((tau - expected).abs() <= tolerance, "{i}: {tau} for {expected}, {segment:?} through {fogs:?}");
             met += u32::from(expected > 0.0);
             touched += u32::from(expected == 0.0 && fogs.iter().any(|f| f.clip(a, b).is_some()));
 
             let depth = random.0.next_1d() * 1.5 * expected;
-            match media.free_flight(&segment, start, depth) {
-                FreeFlight::Collision { t, medium } => {
+            match media.free_flight(&segment, &media.regions_at(segment.p), depth) {
+                FreeFlight::Collision { t, medium, .. } => {
                     flights += 1;
                     let reached = optical_depth_to(&fogs, a, b, t);
                     assert!(
@@ -138,7 +138,7 @@ fn of_segments_is_that_of_clipping_to_slabs() {
             if let Some(medium) = start
                 && let Some(flight) = media.short_flight(&segment, medium, depth)
             {
-                let FreeFlight::Collision { t, medium: there } = media.free_flight(&segment, start, depth) else {
+                let FreeFlight::Collision { t, medium: there, .. } = media.free_flight(&segment, &media.regions_at(segment.p), depth) else {
                     panic!("{i}: a short flight that passes, {segment:?}");
                 };
                 assert!(there == medium && segment.at(t).distance(flight.q) <= 1e-12, "{i}: {flight:?} but {t}");

@@ -3,7 +3,7 @@
 use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
 use vdf::{
     geometry::{Segment, Triangle},
-    render::{FreeFlight, Integrator, Media, PhaseFunction as _, Sampler},
+    render::{FreeFlight, Integrator, Media, PhaseFunction as _, RegionSet, Sampler},
     scene::{Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Rgb, Scene, Surface},
 };
 
@@ -14,16 +14,16 @@ use crate::{
 
 /// The airlight integral along +Z with any transmittance towards the light.
 fn airlight(scene: &Scene, z: (f64, f64)) -> f64 {
-    let media = Media::new(&scene.media, &scene.boundaries);
+    let media = Media::of_scene(&scene);
     let Emitter::Point { position, intensity } = scene.emitters[0] else { panic!("a point light") };
     let Medium { sigma_t, albedo, phase } = scene.media[0];
     let outside = Segment::new(dvec3(0.0, 0.0, -99.0), DVec3::ZERO);
-    assert_eq!(media.transmittance(&outside, None), 1.0, "the camera is in vacuum");
+    assert_eq!(media.transmittance(&outside, &media.regions_at(outside.p)), 1.0, "the camera is in vacuum");
     let f = |t: f64| {
         let p = dvec3(0.0, 0.0, t);
         let d = (position - p).normalize();
         let in_scattered = phase.pdf_direction(DVec3::Z, d) * f64::from(intensity.x) / p.distance_squared(position);
-        let tau = sigma_t * (t - z.0) + media.optical_depth(&Segment::new(p, position), Some(MediumId(0)));
+        let tau = sigma_t * (t - z.0) + media.optical_depth(&Segment::new(p, position), &media.regions_at(p));
         sigma_t * f64::from(albedo.x) * in_scattered * (-tau).exp()
     };
     integrate(&f, z.0, z.1)
@@ -77,26 +77,23 @@ fn case_37_and_42_airlight_from_odd_places() {
 #[test]
 fn case_36_the_ends_of_the_unit_interval() {
     let scene = room(&[]);
-    let media = Media::new(&scene.media, &scene.boundaries);
+    let media = Media::of_scene(&scene);
     let inside = dvec3(4.0, 6.0, 4.0);
     let s = Segment::new(inside, inside + DVec3::X * 2.0);
     let depth = |xi: f64| -(-xi).ln_1p();
-    assert_eq!(
-        media.free_flight(&s, Some(MediumId(0)), depth(0.0)),
-        FreeFlight::Collision { t: 0.0, medium: MediumId(0) }
-    );
-    assert_eq!(
-        media.free_flight(&s, Some(MediumId(0)), depth(1.0_f64.next_down())),
-        FreeFlight::Passed(Some(MediumId(0)))
-    );
+    let fog = media.regions_at(inside);
+    assert_eq!(media.medium_in(&fog), Some(MediumId(0)));
+    let collision = |t| FreeFlight::Collision { t, medium: MediumId(0), regions: fog.clone() };
+    assert_eq!(media.free_flight(&s, &fog, depth(0.0)), collision(0.0));
+    assert_eq!(media.free_flight(&s, &fog, depth(1.0_f64.next_down())), FreeFlight::Passed(fog.clone()));
     assert!(depth(1.0_f64.next_down()) < 37.0);
     // No collision in a vacuum, not even at depth 0; the first one where the fog begins.
     let from_outside = Segment::new(dvec3(0.0, 4.0, 4.0), dvec3(4.0, 4.0, 4.0));
-    assert_eq!(media.free_flight(&from_outside, None, 0.0), FreeFlight::Collision { t: 0.25, medium: MediumId(0) });
+    assert_eq!(media.free_flight(&from_outside, &media.regions_at(from_outside.p), 0.0), collision(0.25));
     // A depth that is reached exactly at the end belongs to what comes behind.
-    let tau = media.optical_depth(&s, Some(MediumId(0)));
-    assert_eq!(media.free_flight(&s, Some(MediumId(0)), tau), FreeFlight::Passed(Some(MediumId(0))));
-    let FreeFlight::Collision { t, .. } = media.free_flight(&s, Some(MediumId(0)), tau.next_down()) else {
+    let tau = media.optical_depth(&s, &media.regions_at(s.p));
+    assert_eq!(media.free_flight(&s, &media.regions_at(s.p), tau), FreeFlight::Passed(media.regions_at(s.q)));
+    let FreeFlight::Collision { t, .. } = media.free_flight(&s, &media.regions_at(s.p), tau.next_down()) else {
         panic!("no collision")
     };
     assert!(t <= 1.0);
@@ -144,22 +141,22 @@ fn case_38_boundaries_that_change_nothing() {
         interior: Some(MediumId(m)),
         exterior: None,
     };
-    let whole = Media::new(&[medium(0.7)], &[slab(0.0, 8.0, 0)]);
+    let whole = Media::new(&[medium(0.7)], &[slab(0.0, 8.0, 0)], None);
     let pieces: Vec<_> = (0..8_u8).map(|i| slab(f32::from(i), f32::from(i) + 1.0, u32::from(i % 2))).collect();
-    let cut = Media::new(&[medium(0.7), medium(0.7)], &pieces);
+    let cut = Media::new(&[medium(0.7), medium(0.7)], &pieces, None);
     let mut empty_between = pieces.clone();
     empty_between[3].interior = Some(MediumId(2));
-    let gap = Media::new(&[medium(0.7), medium(0.7), medium(0.0)], &empty_between);
+    let gap = Media::new(&[medium(0.7), medium(0.7), medium(0.0)], &empty_between, None);
     for i in 0..2000 {
         let mut u = Sampler::new(71, i, 0, 0);
         let mut end = |x: f64| dvec3(x, 1.6 * u.next_1d() - 0.8, 1.6 * u.next_1d() - 0.8);
         let s = Segment::new(end(-1.0), end(9.0));
-        let tau = whole.optical_depth(&s, None);
-        assert!((cut.optical_depth(&s, None) - tau).abs() < 1e-13 * tau);
-        assert!((gap.optical_depth(&s, None) - tau * 7.0 / 8.0).abs() < 1e-13 * tau);
+        let tau = whole.optical_depth(&s, &whole.regions_at(s.p));
+        assert!((cut.optical_depth(&s, &cut.regions_at(s.p)) - tau).abs() < 1e-13 * tau);
+        assert!((gap.optical_depth(&s, &gap.regions_at(s.p)) - tau * 7.0 / 8.0).abs() < 1e-13 * tau);
         let wanted = tau * u.next_1d();
-        let at = |media: &Media| match media.free_flight(&s, None, wanted) {
-            FreeFlight::Collision { t, medium } => Some((t, medium)),
+        let at = |media: &Media| match media.free_flight(&s, &media.regions_at(s.p), wanted) {
+            FreeFlight::Collision { t, medium, .. } => Some((t, medium)),
             FreeFlight::Passed(_) => None,
         };
         let (a, b) = (at(&whole).expect("reached"), at(&cut).expect("reached"));
@@ -172,17 +169,17 @@ fn case_38_boundaries_that_change_nothing() {
 #[test]
 fn case_39_collisions_stay_in_their_medium() {
     let scene = room(&[]);
-    let media = Media::new(&scene.media, &scene.boundaries);
+    let media = Media::of_scene(&scene);
     for i in 0..20_000 {
         let mut u = Sampler::new(72, i, 0, 0);
         let mut point = || dvec3(u.next_1d(), u.next_1d(), u.next_1d()) * 10.0 - 1.0;
         let s = Segment::new(point(), point());
         let inside = |p: DVec3| p.cmpge(DVec3::splat(1.0)).all() && p.cmple(DVec3::splat(7.0)).all();
         let start = inside(s.p).then_some(MediumId(0));
-        let tau = media.optical_depth(&s, start);
+        let tau = media.optical_depth(&s, &media.regions_at(s.p));
         // The last depths before the end of the fog, or any.
         let wanted = if i % 2 == 0 { tau.next_down() } else { tau * u.next_1d() };
-        if let FreeFlight::Collision { t, .. } = media.free_flight(&s, start, wanted) {
+        if let FreeFlight::Collision { t, .. } = media.free_flight(&s, &media.regions_at(s.p), wanted) {
             let p = s.at(t);
             let off = (DVec3::splat(1.0) - p).max(p - DVec3::splat(7.0)).max_element();
             assert!((0.0..=1.0).contains(&t) && off < 1e-12, "{s:?}: {t}, outside by {off}");
@@ -260,16 +257,16 @@ fn case_43_intervals_without_length() {
     for thickness in [0.0, 1e-30, 1e-12, 1e-9, 1e-8] {
         // Thinner than the place of a crossing is known beside coordinates of 10⁴.
         let slab = closed(-large * vec3(1.0, 1.0, 0.0), large * vec3(1.0, 1.0, 0.0) + Vec3::Z * thickness);
-        let media = Media::new(&[medium(1.0)], &[slab]);
-        let tau = media.optical_depth(&s, None);
+        let media = Media::new(&[medium(1.0)], &[slab], None);
+        let tau = media.optical_depth(&s, &media.regions_at(s.p));
         assert!(tau <= 1.1e-8, "a slab of {thickness} has the optical depth {tau}");
-        assert_eq!(media.free_flight(&s, None, 1.0), FreeFlight::Passed(None), "a slab of {thickness}");
+        assert_eq!(media.free_flight(&s, &media.regions_at(s.p), 1.0), FreeFlight::Passed(RegionSet::default()), "a slab of {thickness}");
     }
     let unit = closed(Vec3::ZERO, Vec3::ONE);
-    let media = Media::new(&[medium(1.0)], std::slice::from_ref(&unit));
+    let media = Media::new(&[medium(1.0)], std::slice::from_ref(&unit), None);
     let through = |p: DVec3, q: DVec3| {
-        let there = media.optical_depth(&Segment::new(p, q), None);
-        let back = media.optical_depth(&Segment::new(q, p), None);
+        let there = media.optical_depth(&Segment::new(p, q), &media.regions_at(p));
+        let back = media.optical_depth(&Segment::new(q, p), &media.regions_at(q));
         assert!((there - back).abs() < 1e-15, "{p} {q}: {there} there, {back} back");
         there
     };
@@ -284,21 +281,23 @@ fn case_43_intervals_without_length() {
     // No length at all, on a corner, inside, outside; zero optical depth, and no collision unless in fog.
     for p in [DVec3::ZERO, DVec3::splat(0.5), DVec3::splat(9.0)] {
         let point = Segment::new(p, p);
-        assert_eq!(media.optical_depth(&point, Some(MediumId(0))), 0.0);
-        assert_eq!(media.transmittance(&point, Some(MediumId(0))), 1.0);
-        assert_eq!(media.free_flight(&point, Some(MediumId(0)), 0.0), FreeFlight::Passed(Some(MediumId(0))));
+        assert_eq!(media.optical_depth(&point, &media.regions_at(point.p)), 0.0);
+        assert_eq!(media.transmittance(&point, &media.regions_at(point.p)), 1.0);
+        assert_eq!(media.free_flight(&point, &media.regions_at(p), 0.0), FreeFlight::Passed(media.regions_at(p)));
         assert!(media.short_flight(&point, MediumId(0), 1.0).is_none());
     }
-    // Each face twice, and once more the other way round: entered and left at one place is not entered.
+    // Each face twice, and once more the other way round: it winds around the inside as one face does.
     let mut folded = unit;
     let turned = folded.triangles.iter().map(|t| Triangle::new(t.vertices[0], t.vertices[2], t.vertices[1]));
     folded.triangles = folded.triangles.iter().copied().chain(turned).chain(folded.triangles.iter().copied()).collect();
-    let media = Media::new(&[medium(1.0)], &[folded]);
-    assert_eq!(media.optical_depth(&Segment::new(dvec3(0.3, 0.4, -1.0), dvec3(0.4, 0.3, 2.0)), None), 0.0);
+    let s = Segment::new(dvec3(0.3, 0.4, -1.0), dvec3(0.4, 0.3, 2.0));
+    let folded = Media::new(&[medium(1.0)], &[folded], None);
+    let (outside, expected) = (RegionSet::default(), media.optical_depth(&s, &RegionSet::default()));
+    assert!(expected > 1.0 && folded.optical_depth(&s, &outside) == expected);
     // A length beyond all measure.
     let far = Segment::new(DVec3::ZERO, DVec3::X * 1e150);
-    assert_eq!(Media::new(&[medium(1e-300)], &[]).transmittance(&far, Some(MediumId(0))), 1.0);
-    assert_eq!(Media::new(&[medium(1.0)], &[]).transmittance(&far, Some(MediumId(0))), 0.0);
+    assert_eq!(Media::new(&[medium(1e-300)], &[], Some(MediumId(0))).transmittance(&far, &RegionSet::default()), 1.0);
+    assert_eq!(Media::new(&[medium(1.0)], &[], Some(MediumId(0))).transmittance(&far, &RegionSet::default()), 0.0);
 }
 
 /// Emitters that fill a ten-millionth of a degree, and one that fills nearly half of the sphere: the light on a wall that faces them.
