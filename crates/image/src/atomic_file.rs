@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
+use crate::ImageError;
+
 /// A file that is written but has not appeared. Dropped, it is removed.
 #[derive(Debug)]
 pub struct StagedFile {
@@ -108,6 +110,15 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
 /// True if there is something at `path` that is neither a regular file nor a directory.
 fn is_special(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+}
+
+pub(crate) fn stage_bytes(path: &Path, bytes: &[u8]) -> Result<StagedFile, ImageError> {
+    StagedFile::write(path, |out| out.write_all(bytes))
+        .map_err(|source| ImageError::Write { path: path.to_owned(), source })
+}
+
+pub(crate) fn persist(path: &Path, file: StagedFile) -> Result<(), ImageError> {
+    file.persist().map_err(|source| ImageError::Write { path: path.to_owned(), source })
 }
 
 fn temporary_beside(path: &Path) -> io::Result<NamedTempFile<File>> {

@@ -37,3 +37,12 @@ impl Image {
         }
     }
 }
+
+/// Refuses an image whose pixels are not `width · height`, or none.
+pub(crate) fn check_shape(image: &Image) -> Result<(), String> {
+    let area = image.width as usize * image.height as usize;
+    if area == 0 || image.pixels.len() != area {
+        return Err(format!("the image is {} × {} pixels but holds {}", image.width, image.height, image.pixels.len()));
+    }
+    Ok(())
+}

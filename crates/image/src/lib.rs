@@ -20,17 +20,19 @@
 
 mod atomic_file;
 mod error;
+mod exr;
+mod format;
 mod image;
-mod image_io;
 pub mod metrics;
+mod png;
 mod srgb;
 
 pub use atomic_file::{PersistError, StagedFile, check_writable, write_atomically};
 pub use error::ImageError;
+pub use exr::{AttributeValue, read_exr, stage_exr, write_exr};
+pub use format::{ImageFormat, read_image};
 pub use image::Image;
-pub use image_io::{
-    AttributeValue, ImageFormat, encode_png, read_exr, read_image, stage_exr, stage_png, write_exr, write_png,
-};
+pub use png::{encode_png, stage_png, write_png};
 
 /// Linear RGB with the primaries of sRGB.
 pub type Rgb = glam::Vec3;

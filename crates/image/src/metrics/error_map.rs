@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{ImageError, image_io::write_png_bytes};
+use crate::{ImageError, png::write_png_bytes};
 
 /// One error for each pixel, 0 where nothing differs.
 #[derive(Clone, Debug, PartialEq)]
