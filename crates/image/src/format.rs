@@ -1,15 +1,12 @@
 //! Which format the file of an image has.
 
-use std::fs::File;
-use std::io::{BufReader, Read as _, Seek as _};
+use std::io::{Read as _, Seek as _};
 use std::path::Path;
 
-use crate::exr::EXR_MAGIC;
+use crate::exr::{EXR_MAGIC, decode_exr};
+use crate::limits::open;
 use crate::png::{PNG_MAGIC, decode_png};
-use crate::{Image, ImageError, read_exr};
-
-/// Most pixels that are read, 16384²: a file that claims more is damaged, and memory is taken before it is found out.
-pub(crate) const MOST_PIXELS: usize = 1 << 28;
+use crate::{Image, ImageError};
 
 /// The kinds of files that images are read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,34 +17,29 @@ pub enum ImageFormat {
     Png,
 }
 
-/// Reads an image of either format, told apart by their first bytes, not by their names. An EXR is read as by [`read_exr`].
+/// Reads an image of either format, told apart by their first bytes, not by their names. An EXR is read as by
+/// [`read_exr`](crate::read_exr).
 ///
 /// A PNG of any depth is taken as sRGB, whatever profile it carries, and decoded to linear values; grey is spread to all channels, alpha
-/// is ignored.
+/// is ignored. Beside the 12 bytes a pixel of the image, some rows and at most 64 MiB are taken.
 ///
 /// # Errors
-/// The file cannot be read, is of neither format or damaged, or an EXR without the channels R, G and B.
+/// The file cannot be read, is no regular file, is of neither format or damaged, has more than 2²⁸ pixels, or is an EXR that
+/// [`read_exr`](crate::read_exr) refuses.
 pub fn read_image(path: &Path) -> Result<(Image, ImageFormat), ImageError> {
-    let malformed = |reason: String| ImageError::Format { path: path.to_owned(), reason };
-    let mut file = open(path)?;
+    let (mut file, length) = open(path)?;
     let mut magic = [0; 4];
-    match file.read_exact(&mut magic).map(|()| magic) {
-        Ok(EXR_MAGIC) => Ok((read_exr(path)?, ImageFormat::Exr)),
-        Ok(PNG_MAGIC) => {
-            file.rewind().map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
-            Ok((decode_png(file).map_err(malformed)?, ImageFormat::Png))
-        }
-        _ => Err(malformed("it is neither an OpenEXR nor a PNG file".to_owned())),
+    // A file that is too short has no magic number, either.
+    let known = file.read_exact(&mut magic).is_ok();
+    file.rewind().map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
+    match magic {
+        EXR_MAGIC if known => Ok((decode_exr(path, file, length)?, ImageFormat::Exr)),
+        PNG_MAGIC if known => Ok((decode_png(path, file, length)?, ImageFormat::Png)),
+        _ => Err(ImageError::Format {
+            path: path.to_owned(),
+            reason: "it is neither an OpenEXR nor a PNG file".to_owned(),
+        }),
     }
-}
-
-pub(crate) fn open(path: &Path) -> Result<BufReader<File>, ImageError> {
-    let unreadable = |source| ImageError::Read { path: path.to_owned(), source };
-    let file = File::open(path).map_err(unreadable)?;
-    if !file.metadata().map_err(unreadable)?.is_file() {
-        return Err(ImageError::Format { path: path.to_owned(), reason: "it is not a file".to_owned() });
-    }
-    Ok(BufReader::new(file))
 }
 
 #[cfg(test)]

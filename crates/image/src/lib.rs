@@ -18,18 +18,25 @@
 //! # }
 //! ```
 
-mod atomic_file;
 mod error;
 mod exr;
+mod files;
 mod format;
+#[cfg(test)]
+mod hostile;
 mod image;
+mod limits;
 pub mod metrics;
 mod png;
 mod srgb;
 
-pub use atomic_file::{PersistError, StagedFile, check_writable, write_atomically};
 pub use error::ImageError;
-pub use exr::{AttributeValue, read_exr, stage_exr, write_exr};
+pub use exr::{
+    AttributeValue, ComponentFormat, ExrOptions, read_exr, stage_exr, stage_exr_with, write_exr, write_exr_with,
+};
+pub use files::{
+    Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, write_atomically,
+};
 pub use format::{ImageFormat, read_image};
 pub use image::Image;
 pub use png::{encode_png, stage_png, write_png};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{ImageError, png::write_png_bytes};
+use crate::{ImageError, png::write_png_of};
 
 /// One error for each pixel, 0 where nothing differs.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +38,7 @@ pub fn magma(error: f32) -> [u8; 3] {
 /// # Errors
 /// The file cannot be written, or the map has no pixels.
 pub fn write_error_map(path: &Path, map: &ErrorMap) -> Result<(), ImageError> {
-    let bytes: Vec<u8> = map.values.iter().flat_map(|&error| magma(error)).collect();
-    write_png_bytes(path, map.width, map.height, &bytes)
+    write_png_of(path, [map.width, map.height], &map.values, |&error| magma(error))
 }
 
 #[cfg(test)]
