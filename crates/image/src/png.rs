@@ -85,14 +85,14 @@ fn encode<T>(out: impl Write, size: [u32; 2], values: &[T], colour: impl Fn(&T) 
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_filter(png::Filter::Adaptive);
-    let mut writer = encoder.write_header()?;
+    let mut writer = encoder.write_header().map_err(system)?;
     if values.len() <= MOST_AT_ONCE {
         let samples: Vec<u8> = values.iter().flat_map(colour).collect();
-        writer.write_image_data(&samples)?;
+        writer.write_image_data(&samples).map_err(system)?;
     } else {
         write_rows(&mut writer, width, values, colour)?;
     }
-    Ok(writer.finish()?)
+    writer.finish().map_err(system)
 }
 
 /// Encodes row by row, so that the image is not held a second time.
@@ -102,14 +102,22 @@ fn write_rows<T>(
     values: &[T],
     colour: impl Fn(&T) -> [u8; 3],
 ) -> io::Result<()> {
-    let mut stream = writer.stream_writer_with_size(PIECE)?;
+    let mut stream = writer.stream_writer_with_size(PIECE).map_err(system)?;
     let mut row = Vec::new();
     for values in values.chunks(width as usize) {
         row.clear();
         row.extend(values.iter().flat_map(&colour));
         stream.write_all(&row)?;
     }
-    Ok(stream.finish()?)
+    stream.finish().map_err(system)
+}
+
+/// The system's own error, so that the caller can tell a full disk from a limit to the size of files.
+fn system(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        error => io::Error::other(error),
+    }
 }
 
 /// Decodes a PNG of `length` bytes row by row. `path` is for messages.

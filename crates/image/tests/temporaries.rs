@@ -1,6 +1,7 @@
 //! What is left behind when a process ends early. Each test runs itself again in a process of its own.
 
 #![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "helpers of tests may fail, too")]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
@@ -38,7 +39,7 @@ fn noise() -> Image {
     let mut random = 1_u32;
     for value in image.pixels.iter_mut().flat_map(|pixel: &mut Rgb| AsMut::<[f32; 3]>::as_mut(pixel)) {
         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        *value = (random >> 8) as f32;
+        *value = (random >> 8) as f32 / (1 << 24) as f32;
     }
     image
 }

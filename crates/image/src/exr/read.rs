@@ -2,11 +2,14 @@
 
 use std::collections::HashSet;
 use std::io::{BufRead, Seek};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use ::exr::block::UncompressedBlock;
+use ::exr::block::chunk::Chunk;
 use ::exr::block::reader::ChunksReader as _;
 use ::exr::error::Error;
+use ::exr::meta::MetaData;
 use ::exr::meta::attribute::SampleType;
 use ::exr::meta::header::Header;
 use ::exr::prelude as openexr;
@@ -56,7 +59,7 @@ pub(crate) fn decode_exr(path: &Path, mut file: impl BufRead + Seek, length: u64
             return Err(malformed("a block is not of the layer that it should be of"));
         }
         check_chunk(&header, &chunk.compressed_block).map_err(malformed)?;
-        let block = UncompressedBlock::decompress_chunk(chunk, chunks.meta_data(), false).map_err(failed)?;
+        let block = decompress(chunk, chunks.meta_data()).map_err(failed)?;
         if !is_largest(block.index.level) {
             return Err(malformed("a block is not of the level that it should be of"));
         }
@@ -74,6 +77,15 @@ pub(crate) fn decode_exr(path: &Path, mut file: impl BufRead + Seek, length: u64
         origin: [position.x(), position.y()],
         full_size: [edge(film.width())?, edge(film.height())?],
     })
+}
+
+/// Decompresses a block whose claims have been checked.
+///
+/// A panic of the decoder becomes an error. Its arithmetic on the values of damaged B44 blocks overflows, which is a panic in builds
+/// that check it, and these values cannot be checked without decoding them. Nothing that the decoder has touched is used again.
+fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, Error> {
+    let decode = AssertUnwindSafe(|| UncompressedBlock::decompress_chunk(chunk, meta, false));
+    catch_unwind(decode).unwrap_or_else(|_| Err(Error::Invalid("compressed data".into())))
 }
 
 /// One channel in the rows of a block.
