@@ -20,12 +20,12 @@ pub enum ImageFormat {
 /// Reads an image of either format, told apart by their first bytes, not by their names. An EXR is read as by
 /// [`read_exr`](crate::read_exr).
 ///
-/// A PNG of any depth is taken as sRGB, whatever profile it carries, and decoded to linear values; grey is spread to all channels, alpha
-/// is ignored. Beside the 12 bytes a pixel of the image, some rows and at most 64 MiB are taken.
+/// A PNG of any depth is taken as sRGB, whatever profile it carries, and decoded to linear values; grey is spread to
+/// all channels, alpha is ignored. Beside the 12 bytes a pixel of the image, some rows and at most 64 MiB are taken.
 ///
 /// # Errors
-/// The file cannot be read, is no regular file, is of neither format or damaged, has more than 2²⁸ pixels, or is an EXR that
-/// [`read_exr`](crate::read_exr) refuses.
+/// The file cannot be read, is no regular file, is of neither format or damaged, has more than 2²⁸ pixels, or is an EXR
+/// that [`read_exr`](crate::read_exr) refuses.
 pub fn read_image(path: &Path) -> Result<(Image, ImageFormat), ImageError> {
     let (mut file, length) = open(path)?;
     let mut magic = [0; 4];

@@ -170,7 +170,8 @@ impl Random {
     }
 }
 
-/// Changes one to eight places: bits, bytes, numbers at the edges of their range, and what is cut out, repeated or lost at the end.
+/// Changes one to eight places: bits, bytes, numbers at the edges of their range, and what is cut out, repeated or lost
+/// at the end.
 fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
     const NUMBERS: [u32; 12] =
         [0, 1, 2, 0x7f, 0xff, 0x100, 0x7fff, 0xffff, 0x7fff_ffff, 0x8000_0000, 0xffff_fffe, 0xffff_ffff];

@@ -18,15 +18,15 @@ pub struct Image {
 }
 
 impl Image {
-    /// A black image that is the whole film, of 12 bytes a pixel. The process is aborted if there is no memory for it: use
-    /// [`Self::try_new`] for sizes that a user may choose.
+    /// A black image that is the whole film, of 12 bytes a pixel. The process is aborted if there is no memory for it:
+    /// use [`Self::try_new`] for sizes that a user may choose.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
         Self::cropped([width, height], [0, 0], [width, height])
     }
 
-    /// A black image of the part of a film of `full_size` pixels that begins at `origin` and has `size` pixels. Its memory is as that
-    /// of [`Self::new`].
+    /// A black image of the part of a film of `full_size` pixels that begins at `origin` and has `size` pixels. Its
+    /// memory is as that of [`Self::new`].
     #[must_use]
     pub fn cropped(full_size: [u32; 2], origin: [u32; 2], size: [u32; 2]) -> Self {
         let [width, height] = size;
@@ -37,8 +37,8 @@ impl Image {
     /// As [`Self::new`], but with an error if there is no memory for it.
     ///
     /// # Errors
-    /// [`ImageError::Memory`] with the bytes that are needed. A system that gives more memory than it has may still end the process
-    /// when the pixels are written.
+    /// [`ImageError::Memory`] with the bytes that are needed. A system that gives more memory than it has may still end
+    /// the process when the pixels are written.
     pub fn try_new(width: u32, height: u32) -> Result<Self, ImageError> {
         Self::try_cropped([width, height], [0, 0], [width, height])
     }

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use crate::{ImageError, Rgb};
 
-/// Most pixels that are read, 16384², which take 3 GiB: whoever wrote a file with more cannot make this process take all memory.
+/// Most pixels that are read, 16384², which take 3 GiB: whoever wrote a file with more cannot make this process take
+/// all memory.
 pub(crate) const MOST_PIXELS: u64 = 1 << 28;
 
 /// Most bytes that deflate makes of one byte: a match of 258 bytes takes at least two bits.
@@ -49,7 +50,8 @@ pub(crate) fn check_area(path: &Path, width: u64, height: u64) -> Result<usize, 
     }
 }
 
-/// Refuses a file of `length` bytes that claims to hold `decoded` bytes of pixels, of which one byte can hold `ratio` at most.
+/// Refuses a file of `length` bytes that claims to hold `decoded` bytes of pixels, of which one byte can hold `ratio`
+/// at most.
 pub(crate) fn check_ratio(path: &Path, length: u64, decoded: u64, ratio: u64) -> Result<(), ImageError> {
     if decoded <= length.saturating_mul(ratio) {
         return Ok(());

@@ -20,8 +20,8 @@ const PIECE: usize = 1 << 20;
 /// Most bytes that the decoder takes for what is not pixels.
 const DECODER_BYTES: usize = 64 << 20;
 
-/// Writes an 8-bit PNG with the sRGB transfer curve. Values outside [0, 1] are clamped, NaN becomes black. The bytes are a function
-/// of the pixels alone. The encoder takes at most 150 MiB beside the image.
+/// Writes an 8-bit PNG with the sRGB transfer curve. Values outside [0, 1] are clamped, NaN becomes black. The bytes
+/// are a function of the pixels alone. The encoder takes at most 150 MiB beside the image.
 ///
 /// # Errors
 /// The file cannot be written, or the image has no pixels.

@@ -19,8 +19,8 @@ const MOST_DWA_CODES: u64 = 16 << 20;
 /// Bytes of a run-length code of two bytes, per byte.
 const RUN_RATIO: u64 = 64;
 
-/// Refuses a header whose layer would take more time or memory than its file of `length` bytes can account for. Returns the
-/// layer's area in pixels.
+/// Refuses a header whose layer would take more time or memory than its file of `length` bytes can account for. Returns
+/// the layer's area in pixels.
 pub(super) fn check_header(path: &Path, headers: &[Header], layer: usize, length: u64) -> Result<usize, ImageError> {
     let malformed = |reason: String| ImageError::Format { path: path.to_owned(), reason };
     let header = &headers[layer];
@@ -64,8 +64,8 @@ fn most_ratio(compression: Compression) -> Option<u64> {
 
 /// Refuses a block that the decoder would make more of than the block's pixels.
 ///
-/// The decoders of ZIP, PIZ, PXR24 and B44 stop there by themselves. That of run lengths does not, and that of DWA believes the
-/// lengths that a block claims for its parts.
+/// The decoders of ZIP, PIZ, PXR24 and B44 stop there by themselves. That of run lengths does not, and that of DWA
+/// believes the lengths that a block claims for its parts.
 pub(super) fn check_chunk(header: &Header, block: &CompressedBlock) -> Result<(), &'static str> {
     let bytes = match block {
         CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,

@@ -21,8 +21,8 @@ use crate::{Image, ImageError, Rgb};
 
 /// Reads the channels R, G and B (half, float or integer) of the first layer that has them; others are ignored.
 ///
-/// It takes the image's 12 bytes a pixel and at most five times its largest block (a tile, or the rows that are compressed together),
-/// and a block of more than 256 MiB is refused. What a file only claims takes no memory.
+/// It takes the image's 12 bytes a pixel and at most five times its largest block (a tile, or the rows that are
+/// compressed together), and a block of more than 256 MiB is refused. What a file only claims takes no memory.
 ///
 /// # Errors
 /// The file cannot be read, is no regular file, is no EXR or damaged, has no such layer or more than 2²⁸ pixels.
@@ -81,8 +81,9 @@ pub(crate) fn decode_exr(path: &Path, mut file: impl BufRead + Seek, length: u64
 
 /// Decompresses a block whose claims have been checked.
 ///
-/// A panic of the decoder becomes an error. Its arithmetic on the values of damaged B44 blocks overflows, which is a panic in builds
-/// that check it, and these values cannot be checked without decoding them. Nothing that the decoder has touched is used again.
+/// A panic of the decoder becomes an error. Its arithmetic on the values of damaged B44 blocks overflows, which is a
+/// panic in builds that check it, and these values cannot be checked without decoding them. Nothing that the decoder
+/// has touched is used again.
 fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBlock, Error> {
     let decode = AssertUnwindSafe(|| UncompressedBlock::decompress_chunk(chunk, meta, false));
     catch_unwind(decode).unwrap_or_else(|_| Err(Error::Invalid("compressed data".into())))

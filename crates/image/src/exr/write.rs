@@ -42,13 +42,14 @@ impl ExrOptions {
 }
 
 /// Writes a lossless single-precision EXR: channels R, G, B, ZIP compression. The data window is the image's place on
-/// the film, the display window the whole film; `chromaticities` are those of sRGB. The bytes are a function of the arguments alone.
+/// the film, the display window the whole film; `chromaticities` are those of sRGB. The bytes are a function of the
+/// arguments alone.
 ///
 /// It encodes 16 rows at a time into the file, so that the image is not held a second time.
 ///
 /// # Errors
-/// The file cannot be written, the image has no pixels, or an attribute's name is empty, repeated, longer than 31 bytes, not ASCII or
-/// one that the format itself uses.
+/// The file cannot be written, the image has no pixels, or an attribute's name is empty, repeated, longer than 31
+/// bytes, not ASCII or one that the format itself uses.
 pub fn write_exr(path: &Path, image: &Image, attributes: &[(&str, AttributeValue)]) -> Result<(), ImageError> {
     write_exr_with(path, image, attributes, &ExrOptions::default())
 }

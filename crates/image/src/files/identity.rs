@@ -30,8 +30,9 @@ pub enum Conflict {
 
 /// Whether `a` and `b` lead to the same file, or would once it is written.
 ///
-/// Files that exist are compared by device and inode (elsewhere than on Unix by their canonical paths), so symbolic and hard links and
-/// `sub/..` make no difference. Names without a file are compared by the folder and the name that they lead to. Cost: a few calls to the system.
+/// Files that exist are compared by device and inode (elsewhere than on Unix by their canonical paths), so symbolic and
+/// hard links and `sub/..` make no difference. Names without a file are compared by the folder and the name that they
+/// lead to. Cost: a few calls to the system.
 #[must_use]
 pub fn same_file(a: &Path, b: &Path) -> bool {
     match (identity(a), identity(b)) {
@@ -41,10 +42,11 @@ pub fn same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Refuses outputs that would replace an input or each other. Each output is a name for the message (what the user knows it by) and its path.
+/// Refuses outputs that would replace an input or each other. Each output is a name for the message (what the user
+/// knows it by) and its path.
 ///
-/// Devices and pipes are not files that could be lost: any number of outputs may go there. Call it before anything is written.
-/// Cost: each output is compared with each input and each other output.
+/// Devices and pipes are not files that could be lost: any number of outputs may go there. Call it before anything is
+/// written. Cost: each output is compared with each input and each other output.
 ///
 /// # Errors
 /// The first conflict, in the order of the outputs.

@@ -11,7 +11,8 @@ pub(super) fn is_special(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// The place that is written when `path` is written: the end of a chain of symbolic links, whether there is a file yet or not.
+/// The place that is written when `path` is written: the end of a chain of symbolic links, whether there is a file yet
+/// or not.
 pub(super) fn resolve(path: &Path) -> io::Result<PathBuf> {
     let mut place = path.to_owned();
     for _ in 0..MOST_LINKS {

@@ -1,8 +1,8 @@
 //! Files that appear whole or not at all.
 //!
 //! The content goes to a temporary file in the same directory, is flushed to the device, and is then renamed. A crash,
-//! a full disk or an interrupt leaves the directory as it was. Files that belong together are all written before the first
-//! is renamed, and are all renamed or none.
+//! a full disk or an interrupt leaves the directory as it was. Files that belong together are all written before the
+//! first is renamed, and are all renamed or none.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Seek as _, Write};
@@ -35,8 +35,8 @@ pub struct PersistError {
 impl StagedFile {
     /// Writes with `write` to a temporary file beside `path`.
     ///
-    /// A symbolic link is written through: the file that it leads to is written, and the link stays. A device or a pipe at `path` is
-    /// written directly, because to rename over it would destroy it.
+    /// A symbolic link is written through: the file that it leads to is written, and the link stays. A device or a pipe
+    /// at `path` is written directly, because to rename over it would destroy it.
     ///
     /// # Errors
     /// What the system says; then nothing new is left behind.
@@ -53,8 +53,8 @@ impl StagedFile {
         Self::write_regular(path, write)
     }
 
-    /// As [`Self::write`] for a writer that must seek and read back. What goes to a device or a pipe is first gathered in a nameless
-    /// file.
+    /// As [`Self::write`] for a writer that must seek and read back. What goes to a device or a pipe is first gathered
+    /// in a nameless file.
     pub(crate) fn write_seekable<E: From<io::Error>>(
         path: &Path,
         write: impl FnOnce(&File) -> Result<(), E>,
@@ -90,14 +90,15 @@ impl StagedFile {
         while_moving(|| self.move_to_place())?
     }
 
-    /// Moves all files to their places, in this order, or none: if one cannot be moved, those before it are taken back, and the older
-    /// files that they had replaced are put back.
+    /// Moves all files to their places, in this order, or none: if one cannot be moved, those before it are taken back,
+    /// and the older files that they had replaced are put back.
     ///
-    /// Older files are kept by a second name (a hard link) until all have moved. Where the file system has no hard links, they are
-    /// renamed for that time.
+    /// Older files are kept by a second name (a hard link) until all have moved. Where the file system has no hard
+    /// links, they are renamed for that time.
     ///
     /// # Errors
-    /// The first that could not be moved. Should an older file not go back to its place, the message says under which name it is kept.
+    /// The first that could not be moved. Should an older file not go back to its place, the message says under which
+    /// name it is kept.
     pub fn persist_all(files: Vec<Self>) -> Result<(), PersistError> {
         let Some(first) = files.first().map(|file| file.path.clone()) else { return Ok(()) };
         while_moving(|| Self::move_all(files)).map_err(|source| PersistError { path: first, source })?
@@ -217,8 +218,8 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     StagedFile::write(path, write)?.persist()
 }
 
-/// Tells, without leaving a trace, whether [`write_atomically`] could write `path` now. A pipe is not tried: its reader would see
-/// an end.
+/// Tells, without leaving a trace, whether [`write_atomically`] could write `path` now. A pipe is not tried: its reader
+/// would see an end.
 ///
 /// # Errors
 /// What the system says.

@@ -89,9 +89,10 @@ fn about_to_exit() -> io::Error {
 
 /// Removes all temporary files of this process and refuses new ones: files that are being written never appear.
 ///
-/// It is meant for a thread that handles signals, just before the process exits: an exit runs no destructors. Files that are being
-/// moved to their places by [`StagedFile::persist_all`](crate::StagedFile::persist_all) arrive first, all of them. Not for a
-/// signal handler itself, since it takes locks and allocates. Later calls do nothing. Cost: one call to the system a file.
+/// It is meant for a thread that handles signals, just before the process exits: an exit runs no destructors. Files
+/// that are being moved to their places by [`StagedFile::persist_all`](crate::StagedFile::persist_all) arrive first,
+/// all of them. Not for a signal handler itself, since it takes locks and allocates. Later calls do nothing. Cost: one
+/// call to the system a file.
 pub fn remove_temporaries() {
     let _moving = lock(&MOVING);
     let mut registry = lock(&REGISTRY);

@@ -23,7 +23,8 @@ impl ErrorMap {
     }
 }
 
-/// The colour of an error in the perceptually uniform colour map `magma`: 0 is black, 1 and more is light yellow. Bytes for a display.
+/// The colour of an error in the perceptually uniform colour map `magma`: 0 is black, 1 and more is light yellow. Bytes
+/// for a display.
 ///
 /// As FLIP's tools colour it, in 256 steps; a byte may be less by 1, for they round and the library cuts off.
 #[must_use]
