@@ -30,6 +30,37 @@ pub enum ImageError {
         /// What is wrong.
         reason: String,
     },
+    /// The file has more pixels than are read.
+    #[error(
+        "cannot read {}: its {width} x {height} pixels need {bytes} bytes of memory, and at most {limit} are taken; \
+         scale it down or crop it",
+        path.display()
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its width in pixels.
+        width: u64,
+        /// Its height in pixels.
+        height: u64,
+        /// What its pixels would need in bytes.
+        bytes: u64,
+        /// What they may need in bytes.
+        limit: u64,
+    },
+    /// There is not enough memory for an image that was asked for.
+    #[error(
+        "an image of {width} x {height} pixels needs {bytes} bytes of memory, which are not there; \
+         make the image smaller or crop it"
+    )]
+    Memory {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// What the pixels need in bytes.
+        bytes: u64,
+    },
     /// The image or its attributes cannot be stored.
     #[error("cannot write {}: {reason}", path.display())]
     Unencodable {

@@ -18,19 +18,28 @@
 //! # }
 //! ```
 
-mod atomic_file;
 mod error;
+mod exr;
+mod files;
+mod format;
+#[cfg(test)]
+mod hostile;
 mod image;
-mod image_io;
+mod limits;
 pub mod metrics;
+mod png;
 mod srgb;
 
-pub use atomic_file::{PersistError, StagedFile, check_writable, write_atomically};
 pub use error::ImageError;
-pub use image::Image;
-pub use image_io::{
-    AttributeValue, ImageFormat, encode_png, read_exr, read_image, stage_exr, stage_png, write_exr, write_png,
+pub use exr::{
+    AttributeValue, ComponentFormat, ExrOptions, read_exr, stage_exr, stage_exr_with, write_exr, write_exr_with,
 };
+pub use files::{
+    Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, write_atomically,
+};
+pub use format::{ImageFormat, read_image};
+pub use image::Image;
+pub use png::{encode_png, stage_png, write_png};
 
 /// Linear RGB with the primaries of sRGB.
 pub type Rgb = glam::Vec3;

@@ -1,8 +1,9 @@
 //! The colour spaces of FLIP.
 //!
-//! XYZ is relative to the white point throughout, so that white is (1, 1, 1). The opponent space of the filters is YCxCz,
-//! Y = 116y − 16, Cx = 500(x − y), Cz = 200(y − z) \[Andersson2020\]. The filters are linear and their weights sum to 1, so
-//! scale and offset of a channel pass through them unchanged; they are left out here: an opponent colour is (y, x − y, y − z).
+//! XYZ is relative to the white point throughout, so that white is (1, 1, 1). The opponent space of the filters is
+//! YCxCz, Y = 116y − 16, Cx = 500(x − y), Cz = 200(y − z) \[Andersson2020\]. The filters are linear and their weights
+//! sum to 1, so scale and offset of a channel pass through them unchanged; they are left out here: an opponent colour
+//! is (y, x − y, y − z).
 
 use glam::{DMat3, DVec3, Mat3, Vec3};
 

@@ -1,7 +1,8 @@
 //! Separable filters: a row at a time, then a column at a time, so that a filter of k × k weights costs 2k.
 //!
-//! A kernel has an odd number of weights, the middle one for the pixel itself. Beyond the border the nearest pixel is repeated.
-//! The loops run over whole rows, weight by weight: they are what the compiler turns into vector instructions.
+//! A kernel has an odd number of weights, the middle one for the pixel itself. Beyond the border the nearest pixel is
+//! repeated. The loops run over whole rows, weight by weight: they are what the compiler turns into vector
+//! instructions.
 
 use std::ops::{AddAssign, Mul};
 
@@ -28,7 +29,8 @@ where
     }
 }
 
-/// Adds the row `y` of the image filtered along columns to `out`; `row` gives the rows of the image, of which there are `height`.
+/// Adds the row `y` of the image filtered along columns to `out`; `row` gives the rows of the image, of which there are
+/// `height`.
 pub(super) fn add_column<'a, T>(row: impl Fn(usize) -> &'a [T], height: usize, y: usize, kernel: &[T], out: &mut [T])
 where
     T: Copy + Mul<Output = T> + AddAssign + 'a,

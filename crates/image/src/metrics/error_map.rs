@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{ImageError, image_io::write_png_bytes};
+use crate::{ImageError, png::write_png_of};
 
 /// One error for each pixel, 0 where nothing differs.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,8 @@ impl ErrorMap {
     }
 }
 
-/// The colour of an error in the perceptually uniform colour map `magma`: 0 is black, 1 and more is light yellow. Bytes for a display.
+/// The colour of an error in the perceptually uniform colour map `magma`: 0 is black, 1 and more is light yellow. Bytes
+/// for a display.
 ///
 /// As FLIP's tools colour it, in 256 steps; a byte may be less by 1, for they round and the library cuts off.
 #[must_use]
@@ -38,8 +39,7 @@ pub fn magma(error: f32) -> [u8; 3] {
 /// # Errors
 /// The file cannot be written, or the map has no pixels.
 pub fn write_error_map(path: &Path, map: &ErrorMap) -> Result<(), ImageError> {
-    let bytes: Vec<u8> = map.values.iter().flat_map(|&error| magma(error)).collect();
-    write_png_bytes(path, map.width, map.height, &bytes)
+    write_png_of(path, [map.width, map.height], &map.values, |&error| magma(error))
 }
 
 #[cfg(test)]

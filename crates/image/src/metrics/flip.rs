@@ -1,23 +1,23 @@
 //! FLIP: the difference that one sees when two images alternate in place.
 //!
-//! *Idea.* At a distance eyes average small detail away, and colours more than brightness. So filter both images by what eyes
-//! resolve, take the difference of colours in a space made for large differences, and amplify it where the one has an edge or a point
-//! that the other has not.
+//! *Idea.* At a distance eyes average small detail away, and colours more than brightness. So filter both images by
+//! what eyes resolve, take the difference of colours in a space made for large differences, and amplify it where the
+//! one has an edge or a point that the other has not.
 //!
-//! *Definition.* \[Andersson2020\], on linear RGB clamped to [0, 1].
-//! Colour pipeline: the opponent colours are filtered by the contrast sensitivity functions, which are sums of Gaussians
-//! Σ aᵢ √(π/bᵢ) exp(−π²d²/bᵢ) of the distance d in degrees, cut at three standard deviations of the widest and normalised; the result
-//! is clamped to RGB's cube and taken to CIELAB with the Hunt adjustment. The HyAB distance to the power 0.7 is mapped to
-//! [0, 1]: [0, 0.4·c] linearly to [0, 0.95] and the rest up to c, the distance of green and blue, to [0.95, 1].
-//! Feature pipeline: luminance is filtered by the first and second derivatives of a Gaussian with the standard deviation 0.082/2 degrees,
-//! whose positive weights sum to 1 and whose negative weights to −1. The gradients' lengths are compared:
-//! ΔE_f = (max(|Δedge|, |Δpoint|)/√2)^0.5. The error is ΔE_c^(1 − ΔE_f).
+//! *Definition.* \[Andersson2020\], on linear RGB clamped to [0, 1]. Colour pipeline: the opponent colours are filtered
+//! by the contrast sensitivity functions, which are sums of Gaussians Σ aᵢ √(π/bᵢ) exp(−π²d²/bᵢ) of the distance d in
+//! degrees, cut at three standard deviations of the widest and normalised; the result is clamped to RGB's cube and
+//! taken to CIELAB with the Hunt adjustment. The HyAB distance to the power 0.7 is mapped to [0, 1]: [0, 0.4·c]
+//! linearly to [0, 0.95] and the rest up to c, the distance of green and blue, to [0.95, 1]. Feature pipeline:
+//! luminance is filtered by the first and second derivatives of a Gaussian with the standard deviation 0.082/2 degrees,
+//! whose positive weights sum to 1 and whose negative weights to −1. The gradients' lengths are compared: ΔE_f =
+//! (max(|Δedge|, |Δpoint|)/√2)^0.5. The error is ΔE_c^(1 − ΔE_f).
 //!
-//! *Guarantee.* Agrees with NVIDIA's flip-evaluator 1.7 to the rounding of single precision, in which both compute. 0 where
-//! nothing differs. The same for any number of threads.
+//! *Guarantee.* Agrees with NVIDIA's flip-evaluator 1.7 to the rounding of single precision, in which both compute. 0
+//! where nothing differs. The same for any number of threads.
 //!
-//! *Cost.* 16 separable filters of about 20 weights a pair of images, six cube roots and two powers a pixel; rows in parallel;
-//! 56 bytes a pixel.
+//! *Cost.* 16 separable filters of about 20 weights a pair of images, six cube roots and two powers a pixel; rows in
+//! parallel; 56 bytes a pixel.
 //!
 //! *Limits.* Knows nothing of masking. What a display cannot show does not count; see `hdr_flip` for more than it can.
 
@@ -33,7 +33,8 @@ use super::{
 };
 use crate::{Image, ImageError, Rgb};
 
-/// Pixels per degree of visual angle where FLIP is used without another: a display 0.7 m wide with 3840 pixels, 0.7 m away.
+/// Pixels per degree of visual angle where FLIP is used without another: a display 0.7 m wide with 3840 pixels, 0.7 m
+/// away.
 pub const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;
 
 /// One Gaussian (a, b) of a contrast sensitivity function; b in square degrees.
@@ -45,7 +46,8 @@ const BLUE_YELLOW: [[f64; 2]; 2] = [[34.1, 0.04], [13.5, 0.025]];
 /// Width of the feature detection filters in degrees: twice their standard deviation.
 const FEATURE_WIDTH: f64 = 0.082;
 
-/// The exponent q_c of colour differences, and the knee that they are mapped to [0, 1] with: p_c of the largest becomes p_t.
+/// The exponent q_c of colour differences, and the knee that they are mapped to [0, 1] with: p_c of the largest becomes
+/// p_t.
 const COLOUR_EXPONENT: f32 = 0.7;
 const KNEE: f32 = 0.4;
 const KNEE_VALUE: f32 = 0.95;
@@ -76,7 +78,8 @@ const COLUMNS: [(usize, Filter, usize); 8] = [
 /// The results: the filtered opponent colour, the edge along x and y, the point along x and y.
 const RESULTS: usize = 7;
 
-/// LDR-FLIP of every pixel, from 0 to 1. The images are linear; values outside [0, 1] are clamped. See the head of the file.
+/// LDR-FLIP of every pixel, from 0 to 1. The images are linear; values outside [0, 1] are clamped. See the head of the
+/// file.
 ///
 /// `pixels_per_degree` is from 1 to 1000: how small pixels are to the observer. [`PIXELS_PER_DEGREE`] is usual.
 ///
@@ -214,7 +217,8 @@ impl Flip {
         if power < knee {
             KNEE_VALUE / knee * power
         } else {
-            // No distance of displayable colours should be larger than that of green and blue; rounding must not make it so.
+            // No distance of displayable colours should be larger than that of green and blue; rounding must not make
+            // it so.
             (KNEE_VALUE + (power - knee) / (self.c_max - knee) * (1.0 - KNEE_VALUE)).min(1.0)
         }
     }
@@ -224,7 +228,8 @@ impl Flip {
 fn filters(pixels_per_degree: f64) -> [Vec<f32>; 7] {
     let widest = BLUE_YELLOW.iter().fold(ACHROMATIC[1].max(RED_GREEN[1]), |widest, [_, b]| widest.max(*b));
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * pixels_per_degree).ceil();
-    // A sum of Gaussians is separable one by one. The product of both axes should have the factor a·√(π/b), so each has its root.
+    // A sum of Gaussians is separable one by one. The product of both axes should have the factor a·√(π/b), so each has
+    // its root.
     let gaussian = |[a, b]: [f64; 2]| {
         let weight = |d: f64| (a * (PI / b).sqrt()).sqrt() * (-PI * PI * d * d / b).exp();
         sample(radius, |i| weight(i / pixels_per_degree))

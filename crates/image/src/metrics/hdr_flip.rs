@@ -1,19 +1,24 @@
 //! HDR-FLIP: FLIP for images whose values a display cannot show at once.
 //!
-//! *Idea.* Show the images at every exposure that somebody might look at them with, and keep the worst error of each pixel.
+//! *Idea.* Show the images at every exposure that somebody might look at them with, and keep the worst error of each
+//! pixel.
 //!
-//! *Definition.* \[Andersson2021\]: the exposures go from c_start to c_stop in N − 1 equal steps, N = max(2, ⌈c_stop − c_start⌉). Let
-//! x_max be what the tone mapper maps to 0.85. Then c_start = log₂(x_max/Y_max) and c_stop = log₂(x_max/Y_median), with the largest and
-//! the median luminance of the reference. At each exposure c both images times 2^c are tone mapped, clamped to [0, 1] and compared by
-//! LDR-FLIP; the map is the largest error of each pixel. The tone mapper is their default, the fit to ACES of \[Narkowicz2016\].
+//! *Definition.* \[Andersson2021\]: the exposures go from c_start to c_stop in N − 1 equal steps, N = max(2, ⌈c_stop −
+//! c_start⌉). Let x_max be what the tone mapper maps to 0.85. Then c_start = log₂(x_max/Y_max) and c_stop =
+//! log₂(x_max/Y_median), with the largest and the median luminance of the reference. At each exposure c both images
+//! times 2^c are tone mapped, clamped to [0, 1] and compared by LDR-FLIP; the map is the largest error of each pixel.
+//! The tone mapper is their default, the fit to ACES of \[Narkowicz2016\].
 //!
-//! *Guarantee.* Agrees with NVIDIA's flip-evaluator 1.7 to the rounding of single precision, in which both compute. As there, the median is
-//! of an even number of pixels the upper one, and at least 2⁻²³. The same for any number of threads.
+//! *Guarantee.* Agrees with NVIDIA's flip-evaluator 1.7 to the rounding of single precision, in which both compute. As
+//! there, the median is of an even number of pixels the upper one, and at least 2⁻²³. The same for any number of
+//! threads.
 //!
-//! *Cost.* LDR-FLIP for each of N exposures; N is about the reference's range in stops, from the median up, at most 151.
+//! *Cost.* LDR-FLIP for each of N exposures; N is about the reference's range in stops, from the median up, at most
+//! 151.
 //!
-//! *Limits.* Values below 0 are taken as 0, for which FLIP is not defined. Where the reference is dark all over (its largest luminance
-//! below 2⁻²³) flip-evaluator gives up; here the largest luminance then bounds the median, and a black reference has 2⁻²³ for both.
+//! *Limits.* Values below 0 are taken as 0, for which FLIP is not defined. Where the reference is dark all over (its
+//! largest luminance below 2⁻²³) flip-evaluator gives up; here the largest luminance then bounds the median, and a
+//! black reference has 2⁻²³ for both.
 
 use super::{ErrorMap, check_pair, colour::luminance, flip::Flip};
 use crate::{Image, ImageError, Rgb};

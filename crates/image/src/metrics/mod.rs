@@ -3,8 +3,8 @@
 //! Two kinds of value are compared, and each function says which:
 //!
 //! - *linear*: the values of [`Image`] as they are. So are [`mse`], [`mae`], [`rel_mse`] and [`hdr_flip`].
-//! - *displayed*: the values that a display is sent, clamped to [0, 1] and with the sRGB curve; the range of the data is 1. So are
-//!   [`psnr`], [`ssim`] and (before the curve) [`ldr_flip`], which are defined for such values only.
+//! - *displayed*: the values that a display is sent, clamped to [0, 1] and with the sRGB curve; the range of the data
+//!   is 1. So are [`psnr`], [`ssim`] and (before the curve) [`ldr_flip`], which are defined for such values only.
 //!
 //! All refuse pairs that differ in size and pixels that are not finite: no figure of them would mean anything.
 
@@ -36,7 +36,8 @@ pub enum DynamicRange {
     Low,
 }
 
-/// The difference between an image and a reference. Serialized without the map; what is not finite becomes null in JSON.
+/// The difference between an image and a reference. Serialized without the map; what is not finite becomes null in
+/// JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// Mean squared error, see [`mse`].
@@ -63,7 +64,8 @@ pub struct Comparison {
 
 /// Compares `image` with `reference` in every way there is here, on all threads of the current pool.
 ///
-/// FLIP depends on the size of a pixel in the observer's eye, `pixels_per_degree`, from 1 to 1000; [`PIXELS_PER_DEGREE`] is usual.
+/// FLIP depends on the size of a pixel in the observer's eye, `pixels_per_degree`, from 1 to 1000;
+/// [`PIXELS_PER_DEGREE`] is usual.
 ///
 /// # Errors
 /// The images differ in size, have no pixels, or have one that is not finite; `pixels_per_degree` is out of range.

@@ -4,8 +4,8 @@
 //! MSE = Σ(x − r)²/n, MAE = Σ|x − r|/n, relMSE = Σ (x − r)²/(r² + 10⁻²·m²) / n with m = Σr/n, all of linear values;
 //! PSNR = 10·log₁₀(1/MSE) dB, of displayed values.
 //!
-//! *Guarantee.* All in double precision, summed in the order of the pixels: the same on any machine and number of threads, but for the
-//! last digits of PSNR, where the system's power function enters.
+//! *Guarantee.* All in double precision, summed in the order of the pixels: the same on any machine and number of
+//! threads, but for the last digits of PSNR, where the system's power function enters.
 //!
 //! *Cost.* One pass; for PSNR two powers a value.
 //!
@@ -30,8 +30,9 @@ pub fn mae(image: &Image, reference: &Image) -> Result<f64, ImageError> {
     mean(image, reference, |x, r| (x - r).abs())
 }
 
-/// Relative mean squared error of linear values: each squared error is divided by r² + 10⁻²·m², where r is the reference's value
-/// and m its mean. The second term keeps dark pixels from dominating. Infinite if the reference is black and the image is not.
+/// Relative mean squared error of linear values: each squared error is divided by r² + 10⁻²·m², where r is the
+/// reference's value and m its mean. The second term keeps dark pixels from dominating. Infinite if the reference is
+/// black and the image is not.
 ///
 /// # Errors
 /// As [`mse`].

@@ -2,10 +2,11 @@
 //!
 //! *Idea.* Eyes compare structure: local mean, contrast and correlation, not values.
 //!
-//! *Definition.* (13) of \[Wang2004\]: in a window, (2μ_x μ_y + C₁)(2σ_xy + C₂) / ((μ_x² + μ_y² + C₁)(σ_x² + σ_y² + C₂)) with
-//! C₁ = 0.01², C₂ = 0.03², of displayed values. The window is their circular Gaussian of 11 × 11 pixels and standard deviation 1.5,
-//! with weights that sum to 1 (14–16). The figure is the mean over all windows that lie within the image (17), and over the three
-//! channels. The paper has grey images; the mean over channels is what scikit-image does with colours.
+//! *Definition.* (13) of \[Wang2004\]: in a window, (2μ_x μ_y + C₁)(2σ_xy + C₂) / ((μ_x² + μ_y² + C₁)(σ_x² + σ_y² +
+//! C₂)) with C₁ = 0.01², C₂ = 0.03², of displayed values. The window is their circular Gaussian of 11 × 11 pixels and
+//! standard deviation 1.5, with weights that sum to 1 (14–16). The figure is the mean over all windows that lie within
+//! the image (17), and over the three channels. The paper has grey images; the mean over channels is what scikit-image
+//! does with colours.
 //!
 //! *Guarantee.* Equals `structural_similarity(…, channel_axis=2, data_range=1, gaussian_weights=True, sigma=1.5,
 //! use_sample_covariance=False)` of scikit-image on the encoded and clamped images, to rounding. 1 if nothing differs.
@@ -31,7 +32,8 @@ const C2: f64 = 0.03 * 0.03;
 /// What is filtered: x, y, x², y², xy.
 const MOMENTS: usize = 5;
 
-/// Mean structural similarity of displayed values, at most 1; none if a side is shorter than 11 pixels. See the head of the file.
+/// Mean structural similarity of displayed values, at most 1; none if a side is shorter than 11 pixels. See the head of
+/// the file.
 ///
 /// # Errors
 /// The images differ in size, have no pixels, or have one that is not finite.
