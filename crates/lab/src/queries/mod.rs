@@ -24,5 +24,8 @@ mod stream;
 mod tests;
 
 pub use record::record_queries;
-pub use replay::{HierarchyReplay, MethodReplay, Replay, ReplayOptions, TimerInfluence, Timing, WrongAnswer, replay};
+pub use replay::{
+    ClassReplay, HierarchyReplay, MethodReplay, ProofReplay, Replay, ReplayOptions, TimerInfluence, Timing,
+    WrongAnswer, replay,
+};
 pub use stream::{QueryStream, StreamOrigin, write_triangles};

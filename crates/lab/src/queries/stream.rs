@@ -168,7 +168,7 @@ fn decode(file: &mut impl Read, length: u64) -> Result<QueryStream, String> {
     };
     file.read_exact(&mut header).map_err(read)?;
     if &header[..8] != MAGIC {
-        return Err("not a file of queries; make one with vdf render --record-queries".to_owned());
+        return Err("not a file of queries; record one".to_owned());
     }
     let u32_at = |i: usize| u32::from_le_bytes([header[i], header[i + 1], header[i + 2], header[i + 3]]);
     let u64_at = |i: usize| u64::from(u32_at(i)) | u64::from(u32_at(i + 4)) << 32;

@@ -1,22 +1,21 @@
-//! What reports measure with: threads, and images that have to be the same.
+//! What reports measure with: processors, medians, and images that have to be the same.
 
-use rayon::ThreadPool;
-use vdf_render::{Image, RenderError};
-
-use crate::failure::Failure;
+use vdf_image::Image;
 
 /// The most threads that a report takes.
-pub(super) const MOST_THREADS: usize = 1024;
+pub const MAX_THREADS: usize = 1024;
 
 /// How many processors there are, as far as this program may use them.
 pub(super) fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// A pool of so many threads, one for each processor by default.
-pub(super) fn pool(threads: Option<usize>) -> Result<ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-    pool.map_err(|e| RenderError::Threads { message: e.to_string() }.into())
+/// The median; 0 of no values.
+pub(super) fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    if n == 0 { 0.0 } else { 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]) }
 }
 
 /// Whether the images are the same, bit for bit.
@@ -29,7 +28,7 @@ pub(super) fn has_pixels(image: &Image, part: &Image) -> bool {
     let offset = |i: usize| usize::try_from(i64::from(part.origin[i]) - i64::from(image.origin[i])).ok();
     let (Some(dx), Some(dy)) = (offset(0), offset(1)) else { return false };
     let (width, part_width) = (image.width as usize, part.width as usize);
-    let bits = |p: &vdf_render::Rgb| p.to_array().map(f32::to_bits);
+    let bits = |p: &vdf_image::Rgb| p.to_array().map(f32::to_bits);
     part.pixels.chunks(part_width.max(1)).enumerate().all(|(y, row)| {
         let first = (y + dy) * width + dx;
         let there = image.pixels.get(first..first + row.len()).unwrap_or_default();
@@ -39,7 +38,7 @@ pub(super) fn has_pixels(image: &Image, part: &Image) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use vdf_render::Rgb;
+    use vdf_image::Rgb;
 
     use super::*;
 
@@ -60,5 +59,33 @@ mod tests {
         shorter.height = 2;
         shorter.pixels.truncate(8);
         assert!(!same_bits(&a, &shorter) && !same_bits(&shorter, &a));
+    }
+
+    #[test]
+    fn a_part_lies_where_it_lies() {
+        let cropped = |[x0, y0, x1, y1]: [u32; 4]| Image::cropped([20, 20], [x0, y0], [x1 - x0, y1 - y0]);
+        let mut image = cropped([10, 5, 14, 8]);
+        for (i, p) in image.pixels.iter_mut().enumerate() {
+            *p = Rgb::splat(i as f32);
+        }
+        let part = |x0, y0, x1, y1| {
+            let mut part = cropped([x0, y0, x1, y1]);
+            for (i, p) in part.pixels.iter_mut().enumerate() {
+                let (x, y) = (i as u32 % part.width + x0 - 10, i as u32 / part.width + y0 - 5);
+                *p = Rgb::splat((4 * y + x) as f32);
+            }
+            part
+        };
+        assert!(has_pixels(&image, &part(10, 5, 14, 8)) && has_pixels(&image, &part(11, 6, 13, 8)));
+        let mut moved = part(11, 6, 13, 8);
+        moved.origin = [12, 6];
+        assert!(!has_pixels(&image, &moved));
+        moved.origin = [9, 6];
+        assert!(!has_pixels(&image, &moved));
+        // Rows that run over the edge are not the next row.
+        assert!(!has_pixels(&image, &part(13, 5, 15, 6)) && !has_pixels(&image, &part(10, 7, 12, 9)));
+        let mut other = part(11, 6, 13, 8);
+        other.pixels[3].y += 1.0;
+        assert!(!has_pixels(&image, &other));
     }
 }

@@ -1,37 +1,37 @@
 //! The figures of a report, one by one, for machines.
 
-use anyhow::{Context as _, anyhow};
 use serde::Serialize;
 
 use super::provenance::Provenance;
+use crate::LabError;
 
 /// One number with all that says what it is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct Figure {
+pub struct Figure {
     /// The table it is in: of the thesis, or of this program's.
-    pub(super) table: String,
+    pub table: String,
     /// The scene.
-    pub(super) scene: String,
+    pub scene: String,
     /// `volpath`, or `raymarch` with its samples per segment.
-    pub(super) integrator: String,
+    pub integrator: String,
     /// The method; empty where none is concerned.
-    pub(super) method: &'static str,
+    pub method: &'static str,
     /// Side of a voxel in world units.
-    pub(super) voxel_size: Option<f64>,
+    pub voxel_size: Option<f64>,
     /// Samples per pixel of the render, where renders differ in it.
-    pub(super) spp: Option<u32>,
+    pub spp: Option<u32>,
     /// Seed of the render, where the figure is about one of several.
-    pub(super) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// What the quantity was measured against, where that varies: triangles, voxels, lights or threads.
-    pub(super) against: Option<f64>,
+    pub against: Option<f64>,
     /// What is measured.
-    pub(super) quantity: &'static str,
+    pub quantity: &'static str,
     /// Unit; empty for a ratio or a count.
-    pub(super) unit: &'static str,
+    pub unit: &'static str,
     /// The value.
-    pub(super) value: f64,
+    pub value: f64,
     /// What the thesis has for it.
-    pub(super) thesis: Option<f64>,
+    pub thesis: Option<f64>,
 }
 
 /// What the figures of a group have in common.
@@ -81,26 +81,27 @@ impl Figure {
 }
 
 /// The figures as CSV after lines that begin with `#` and say where they come from.
-pub(super) fn write_csv(figures: &[Figure], provenance: &Provenance) -> anyhow::Result<String> {
+pub(super) fn csv(figures: &[Figure], provenance: &Provenance) -> Result<String, LabError> {
+    let fail = |message: String| LabError::Form { what: "the CSV", message };
     let mut text = Vec::new();
     for (name, value) in provenance.entries() {
         text.extend_from_slice(format!("# {name}: {}\n", value.replace(['\n', '\r'], " ")).as_bytes());
     }
     let mut writer = csv::Writer::from_writer(text);
     for figure in figures {
-        writer.serialize(figure).context("cannot express the figures as CSV")?;
+        writer.serialize(figure).map_err(|e| fail(e.to_string()))?;
     }
-    let text = writer.into_inner().map_err(|e| anyhow!("cannot express the figures as CSV: {e}"))?;
-    Ok(String::from_utf8(text)?)
+    let text = writer.into_inner().map_err(|e| fail(e.to_string()))?;
+    String::from_utf8(text).map_err(|e| fail(e.to_string()))
 }
 
 /// The figures as JSON: `provenance` and `figures`. What is not finite is null.
-pub(super) fn write_json(figures: &[Figure], provenance: &Provenance) -> anyhow::Result<String> {
+pub(super) fn json(figures: &[Figure], provenance: &Provenance) -> Result<String, LabError> {
     #[derive(Serialize)]
     struct Report<'a> {
         provenance: &'a Provenance,
         figures: &'a [Figure],
     }
     let json = serde_json::to_string_pretty(&Report { provenance, figures });
-    Ok(json.context("cannot express the figures as JSON")? + "\n")
+    json.map(|json| json + "\n").map_err(|e| LabError::Form { what: "the JSON", message: e.to_string() })
 }

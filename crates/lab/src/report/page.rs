@@ -2,35 +2,44 @@
 
 use std::fmt::Write as _;
 
-use anyhow::Context as _;
 use minijinja::{Environment, context, syntax::SyntaxConfig, value::Serde};
 use serde::Serialize;
+use vdf_image::{Image, encode_png};
 
 use super::{plot::Plot, provenance::Provenance};
+use crate::LabError;
 
 /// A report.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Page {
-    pub(super) title: String,
+pub struct Page {
+    /// The title.
+    pub title: String,
     /// What it is about, a paragraph each.
-    pub(super) lead: Vec<String>,
-    pub(super) sections: Vec<Section>,
+    pub lead: Vec<String>,
+    /// Its parts.
+    pub sections: Vec<Section>,
 }
 
 /// A part of a report under one heading.
 #[derive(Clone, Debug, Default, Serialize)]
-pub(super) struct Section {
-    pub(super) heading: String,
-    pub(super) paragraphs: Vec<String>,
-    pub(super) images: Vec<Picture>,
-    pub(super) comparisons: Vec<Comparison>,
-    pub(super) plots: Vec<Plot>,
-    pub(super) tables: Vec<Table>,
+pub struct Section {
+    /// The heading.
+    pub heading: String,
+    /// What it says.
+    pub paragraphs: Vec<String>,
+    /// Images, in the page only.
+    pub images: Vec<Picture>,
+    /// Pairs of images, in the page only.
+    pub comparisons: Vec<Comparison>,
+    /// Plots, in the page only.
+    pub plots: Vec<Plot>,
+    /// Tables.
+    pub tables: Vec<Table>,
 }
 
 /// An image inside the page.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Picture {
+pub struct Picture {
     /// The image as a data URI.
     uri: String,
     caption: String,
@@ -40,67 +49,87 @@ pub(super) struct Picture {
 
 /// Two images of one size, one over the other, with a slider that moves the border between them; side by side without a script.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Comparison {
-    pub(super) caption: String,
-    /// Each with its own caption.
-    pub(super) left: Picture,
-    pub(super) right: Picture,
+pub struct Comparison {
+    /// What they show.
+    pub caption: String,
+    /// The lower one, with its own caption.
+    pub left: Picture,
+    /// The one over it, with its own caption.
+    pub right: Picture,
 }
 
 /// A table; the first column names the rows.
 #[derive(Clone, Debug, Default, Serialize)]
-pub(super) struct Table {
-    pub(super) caption: String,
-    pub(super) columns: Vec<&'static str>,
-    pub(super) rows: Vec<Row>,
+pub struct Table {
+    /// What it shows; may be empty under a heading that says so.
+    pub caption: String,
+    /// Headings of the columns.
+    pub columns: Vec<&'static str>,
+    /// The rows, each with as many cells as there are columns.
+    pub rows: Vec<Row>,
 }
 
 /// A row of a table.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Row {
-    pub(super) cells: Vec<Cell>,
+pub struct Row {
+    /// The cells.
+    pub cells: Vec<Cell>,
     /// The first of a group, set apart from the row above.
-    pub(super) first: bool,
+    pub first: bool,
 }
 
 /// A cell of a table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub(super) struct Cell {
-    pub(super) text: String,
+pub struct Cell {
+    /// What it says.
+    pub text: String,
     /// What the thesis has in this place.
-    pub(super) thesis: Option<String>,
-    pub(super) mark: Option<Mark>,
+    pub thesis: Option<String>,
+    /// Whether that is good or bad, where it is either.
+    pub mark: Option<Mark>,
 }
 
 /// What is to be seen at a glance; the text says it, too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Mark {
+pub enum Mark {
+    /// Green.
     Good,
+    /// Red.
     Bad,
 }
 
 impl Picture {
-    /// A PNG of this size in pixels.
-    pub(super) fn png(bytes: &[u8], [width, height]: [u32; 2], caption: String) -> Self {
+    /// This image as a PNG.
+    ///
+    /// # Errors
+    /// [`LabError::Form`] if the image has no pixels.
+    pub fn new(image: &Image, caption: String) -> Result<Self, LabError> {
         use base64::{Engine as _, prelude::BASE64_STANDARD};
-        Self { uri: format!("data:image/png;base64,{}", BASE64_STANDARD.encode(bytes)), caption, width, height }
+        let png = encode_png(image).map_err(|message| LabError::Form { what: "a picture for the page", message })?;
+        let uri = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png));
+        Ok(Self { uri, caption, width: image.width, height: image.height })
     }
 }
 
 impl Row {
-    pub(super) fn new(cells: Vec<Cell>) -> Self {
+    /// A row of the group of the row above.
+    #[must_use]
+    pub fn new(cells: Vec<Cell>) -> Self {
         Self { cells, first: false }
     }
 }
 
 impl Cell {
     /// Beside the figure of the thesis.
-    pub(super) fn beside(text: String, thesis: Option<String>) -> Self {
+    #[must_use]
+    pub fn beside(text: String, thesis: Option<String>) -> Self {
         Self { text, thesis, mark: None }
     }
 
-    pub(super) fn marked(self, good: bool) -> Self {
+    /// Marked as good or bad.
+    #[must_use]
+    pub fn marked(self, good: bool) -> Self {
         Self { mark: Some(if good { Mark::Good } else { Mark::Bad }), ..self }
     }
 
@@ -120,17 +149,18 @@ impl<T: Into<String>> From<T> for Cell {
 
 impl Page {
     /// The page in one file: nothing loaded from elsewhere, no script but that of the sliders.
-    pub(super) fn html(&self, provenance: &Provenance) -> anyhow::Result<String> {
+    pub(super) fn html(&self, provenance: &Provenance) -> Result<String, LabError> {
         let mut environment = Environment::new();
         let syntax = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build();
-        environment.set_syntax(syntax.context("cannot make the page")?);
+        let fail = |e: minijinja::Error| LabError::Form { what: "the page", message: e.to_string() };
+        environment.set_syntax(syntax.map_err(fail)?);
         environment
-            .add_template("report.html", include_str!("../../../templates/report.html"))
+            .add_template("report.html", include_str!("../../templates/report.html"))
             .and_then(|()| environment.get_template("report.html"))
             .and_then(|template| {
                 template.render(context! { page => Serde(self), provenance => Serde(provenance.entries()) })
             })
-            .context("cannot make the page")
+            .map_err(fail)
     }
 
     /// The tables for a terminal.

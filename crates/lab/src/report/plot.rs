@@ -1,10 +1,11 @@
 //! Plots, laid out in numbers; the template draws them as SVG.
 
 use serde::Serialize;
+use vdf_visibility::{FieldKind, Method, PointProver};
 
 /// Lines over logarithmic axes, ready to draw.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Plot {
+pub struct Plot {
     title: String,
     x_label: String,
     y_label: String,
@@ -19,10 +20,13 @@ pub(super) struct Plot {
 
 /// A line to plot, and between which lines it might lie as well; these have as many points, one for each of the line's own.
 #[derive(Clone, Debug)]
-pub(super) struct Banded {
-    pub(super) series: Series,
-    pub(super) low: Vec<(f64, f64)>,
-    pub(super) high: Vec<(f64, f64)>,
+pub struct Banded {
+    /// The line.
+    pub series: Series,
+    /// One edge of the band.
+    pub low: Vec<(f64, f64)>,
+    /// The other edge.
+    pub high: Vec<(f64, f64)>,
 }
 
 impl From<Series> for Banded {
@@ -33,13 +37,15 @@ impl From<Series> for Banded {
 
 /// A line to plot.
 #[derive(Clone, Debug)]
-pub(super) struct Series {
-    pub(super) name: String,
-    pub(super) points: Vec<(f64, f64)>,
+pub struct Series {
+    /// Its name in the legend.
+    pub name: String,
+    /// Its points, from left to right.
+    pub points: Vec<(f64, f64)>,
     /// Number of its colour.
-    pub(super) colour: usize,
+    pub colour: usize,
     /// 0 is solid, others are dashed in different ways.
-    pub(super) dash: usize,
+    pub dash: usize,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -58,14 +64,30 @@ const FRAME: [f64; 4] = [56.0, 12.0, 468.0, 254.0];
 /// Number of colours in the template.
 pub(super) const COLOURS: usize = 6;
 
+impl Series {
+    /// A line without points in the style of a method, by its name: a colour for the field, a dash for the neighbourhood.
+    pub(super) fn in_style_of(method: &str) -> Self {
+        let method: Method = method.parse().unwrap_or(Method::NONE);
+        let colour = match method.field() {
+            Some(FieldKind::Ndf) => 0,
+            Some(FieldKind::Amr) => 1,
+            Some(FieldKind::Dsz) => 2,
+            Some(FieldKind::Dual) => 3,
+            None => 4,
+        };
+        let dash = match method.point_prover() {
+            PointProver::Field => 0,
+            PointProver::Safe => 1,
+            PointProver::Extended => 2,
+        };
+        Self { name: String::new(), points: vec![], colour, dash }
+    }
+}
+
 impl Plot {
     /// Lines over axes that are both logarithmic. What is not positive and finite is left out; `None` if nothing remains.
-    pub(super) fn logarithmic<S: Into<Banded>>(
-        title: String,
-        x_label: &str,
-        y_label: &str,
-        series: Vec<S>,
-    ) -> Option<Self> {
+    #[must_use]
+    pub fn logarithmic<S: Into<Banded>>(title: String, x_label: &str, y_label: &str, series: Vec<S>) -> Option<Self> {
         let series: Vec<Banded> = series
             .into_iter()
             .map(|s| {

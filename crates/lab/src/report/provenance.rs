@@ -1,6 +1,6 @@
 //! Where a report's figures come from: machine, program, command.
 
-use std::env;
+use std::{env, ffi::OsString};
 
 use serde::Serialize;
 use sysinfo::{CpuRefreshKind, RefreshKind, System};
@@ -9,35 +9,37 @@ use super::bench::processors;
 
 /// What one has to know to repeat a measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub(super) struct Provenance {
-    /// The command line.
-    pub(super) command: String,
+pub struct Provenance {
+    /// The command line, where there was one; see [`Provenance::set_command`].
+    pub command: Option<String>,
     /// Seed of the renders.
-    pub(super) seed: u64,
+    pub seed: u64,
     /// Version of this program.
-    pub(super) version: &'static str,
+    pub version: &'static str,
     /// The commit that it was built from, if it was built in a repository.
-    pub(super) commit: Option<&'static str>,
+    pub commit: Option<&'static str>,
     /// Profile of the build: times of `debug` say little.
-    pub(super) profile: &'static str,
+    pub profile: &'static str,
     /// The compiler.
-    pub(super) rustc: &'static str,
+    pub rustc: &'static str,
     /// Model of the processor.
-    pub(super) cpu: String,
+    pub cpu: String,
     /// Logical processors that the program may use.
-    pub(super) cores: usize,
+    pub cores: usize,
     /// The operating system.
-    pub(super) os: String,
+    pub os: String,
 }
 
 impl Provenance {
-    pub(super) fn new(seed: u64) -> Self {
+    /// This program on this machine.
+    #[must_use]
+    pub fn here(seed: u64) -> Self {
         let refresh = RefreshKind::nothing().with_cpu(CpuRefreshKind::nothing());
         let system = System::new_with_specifics(refresh).ok();
         let brand = system.as_ref().and_then(|s| s.cpus().first()).map(|c| c.brand().trim().to_owned());
         let cpu = brand.filter(|brand| !brand.is_empty());
         Self {
-            command: env::args_os().map(|a| quoted(&a.to_string_lossy())).collect::<Vec<_>>().join(" "),
+            command: None,
             seed,
             version: env!("CARGO_PKG_VERSION"),
             commit: option_env!("VDF_COMMIT"),
@@ -49,10 +51,16 @@ impl Provenance {
         }
     }
 
+    /// Remembers the command, its arguments quoted as a shell would need them.
+    pub fn set_command(&mut self, arguments: impl IntoIterator<Item = OsString>) {
+        let quoted: Vec<_> = arguments.into_iter().map(|a| quoted(&a.to_string_lossy())).collect();
+        self.command = Some(quoted.join(" "));
+    }
+
     /// Names and values, in words.
-    pub(super) fn entries(&self) -> [(&'static str, String); 8] {
-        [
-            ("command", self.command.clone()),
+    pub(super) fn entries(&self) -> Vec<(&'static str, String)> {
+        let mut entries: Vec<_> = self.command.iter().map(|command| ("command", command.clone())).collect();
+        entries.extend([
             ("seed", self.seed.to_string()),
             ("program", format!("vdf {}, {} build", self.version, self.profile)),
             ("commit", self.commit.unwrap_or("unknown").to_owned()),
@@ -60,7 +68,8 @@ impl Provenance {
             ("processor", self.cpu.clone()),
             ("cores", self.cores.to_string()),
             ("system", self.os.clone()),
-        ]
+        ]);
+        entries
     }
 }
 
@@ -71,5 +80,19 @@ fn quoted(argument: &str) -> String {
         argument.to_owned()
     } else {
         format!("'{}'", argument.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_can_be_pasted_into_a_shell() {
+        let mut here = Provenance::here(7);
+        assert!(here.entries().iter().all(|(name, _)| *name != "command"));
+        here.set_command(["vdf", "report", "a b", "", "it's", "-D", "x=1"].map(OsString::from));
+        assert_eq!(here.entries()[0], ("command", r"vdf report 'a b' '' 'it'\''s' -D x=1".to_owned()));
+        assert_eq!(here.entries()[1], ("seed", "7".to_owned()));
     }
 }

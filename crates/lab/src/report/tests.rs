@@ -9,7 +9,7 @@ fn series(points: &[(f64, f64)]) -> Series {
 fn page(plots: Vec<Plot>) -> String {
     let section = Section { heading: "h".to_owned(), plots, ..Section::default() };
     let page = Page { title: "t".to_owned(), lead: vec![], sections: vec![section] };
-    page.html(&Provenance::new(0)).unwrap()
+    page.html(&Provenance::here(0)).unwrap()
 }
 
 #[test]
@@ -45,19 +45,6 @@ fn text_is_aligned_and_has_the_figures_of_the_thesis() {
     let table = Table { caption: "c".to_owned(), columns: vec!["name", "n"], rows };
     let section = Section { heading: "h".to_owned(), tables: vec![table], ..Section::default() };
     let page = Page { title: "t".to_owned(), lead: vec![], sections: vec![section] };
-    let text = page.text(&Provenance::new(0));
+    let text = page.text(&Provenance::here(0));
     assert!(text.ends_with("## h\n\nc\nname            n\na       1.0 (2.0)\nlonger          ×\n"), "{text}");
-}
-
-#[test]
-fn numbers_in_words() {
-    assert_eq!(
-        [0.0, 0.012_34, 1.0, 12.34, 123.4, 12_345.6, -0.5].map(short),
-        ["0", "0.0123", "1.00", "12.3", "123", "12346", "-0.500"]
-    );
-    assert_eq!(
-        (seconds(0.0123), seconds(1.5), seconds(-0.02)),
-        ("12.3 ms".to_owned(), "1.50 s".to_owned(), "-20.0 ms".to_owned())
-    );
-    assert_eq!(short(f64::INFINITY), "inf");
 }

@@ -22,7 +22,9 @@ use std::{array, sync::Arc, time::Instant};
 
 use rayon::prelude::*;
 use vdf_geometry::Bounds;
-use vdf_render::{PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads};
+use vdf_render::{
+    PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
+};
 use vdf_scene::Scene;
 use vdf_visibility::{Answer, Method, Provers, QueryKind, ShadowQuery};
 use vdf_voxel::{VoxelGrid, voxelize};

@@ -2,23 +2,19 @@
 //!
 //! A reference is three files: an EXR for each half, to be looked at or compared with other images, and a JSON that says what they are and
 //! has their checksums. What the name of the file and the JSON cannot tell, above all whether this program would still render the same,
-//! is asked of the pixels: a few are rendered again and must have the same bits (`measure.rs`).
+//! is asked of the pixels: a few are rendered again and must have the same bits (`references.rs`).
 
 use std::{
     fs, io,
     path::{Path, PathBuf},
 };
 
-use anyhow::Context as _;
 use serde::{Deserialize, Serialize};
-use vdf_render::{
-    Image, RenderError, check_writable, read_exr,
-    scene::{PixelRect, Scene},
-    write_atomically, write_exr,
-};
+use vdf_image::{Image, check_writable, read_exr, write_atomically, write_exr};
+use vdf_render::Integrator;
+use vdf_scene::{PixelRect, Scene};
 
-use super::{measure::Setting, reference::SEEDS};
-use crate::failure::Failure;
+use crate::LabError;
 
 /// A folder of references.
 pub(super) struct Cache {
@@ -61,15 +57,16 @@ pub(super) enum Lookup {
 }
 
 impl Key {
-    pub(super) fn new(name: &str, scene: &Scene, setting: Setting, spp: u32) -> Self {
+    /// The reference of a scene with two halves of `spp` samples per pixel and these seeds.
+    pub(super) fn new(name: &str, scene: &Scene, integrator: Integrator, spp: u32, seeds: [u64; 2]) -> Self {
         let PixelRect { x0, y0, x1, y1 } = scene.film.crop;
         Self {
             scene: name.to_owned(),
             checksum: scene.checksum(),
             crop: [x0, y0, x1, y1],
-            integrator: setting.to_string(),
+            integrator: integrator.to_string(),
             spp,
-            seeds: SEEDS,
+            seeds,
         }
     }
 
@@ -85,14 +82,13 @@ impl Key {
 
 impl Cache {
     /// Makes the folder if need be.
-    pub(super) fn open(folder: Option<&Path>) -> Result<Self, Failure> {
+    pub(super) fn open(folder: Option<&Path>) -> Result<Self, LabError> {
         let standard = || dirs::cache_dir().unwrap_or_else(std::env::temp_dir).join("vdf-references");
         let folder = folder.map_or_else(standard, Path::to_owned);
-        fs::create_dir_all(&folder)
-            .and_then(|()| check_writable(&folder.join("reference.json")))
-            .with_context(|| format!("cannot keep references in {}; name another folder by --cache", folder.display()))
-            .map_err(Failure::Work)?;
-        Ok(Self { folder })
+        match fs::create_dir_all(&folder).and_then(|()| check_writable(&folder.join("reference.json"))) {
+            Ok(()) => Ok(Self { folder }),
+            Err(source) => Err(LabError::References { folder, source }),
+        }
     }
 
     pub(super) fn folder(&self) -> &Path {
@@ -128,7 +124,11 @@ impl Cache {
         }
     }
 
-    pub(super) fn store(&self, key: &Key, halves: &[Image; 2]) -> Result<(), Failure> {
+    pub(super) fn store(&self, key: &Key, halves: &[Image; 2]) -> Result<(), LabError> {
+        let fail = |path: &Path| {
+            let path = path.to_owned();
+            move |source| LabError::Write { path, source }
+        };
         let mut crc32 = [0; 2];
         for (i, (path, image)) in self.halves(key).iter().zip(halves).enumerate() {
             let attributes = [
@@ -137,19 +137,14 @@ impl Cache {
                 ("vdf.samplesPerPixel", i64::from(key.spp).into()),
                 ("vdf.seed", key.seeds[i].to_string().into()),
             ];
-            write_exr(path, image, &attributes).map_err(RenderError::from)?;
-            crc32[i] = fs::read(path)
-                .map(|bytes| crc32fast::hash(&bytes))
-                .with_context(|| format!("cannot read {}", path.display()))
-                .map_err(Failure::Work)?;
+            write_exr(path, image, &attributes)?;
+            crc32[i] = fs::read(path).map(|bytes| crc32fast::hash(&bytes)).map_err(fail(path))?;
         }
         let description = Description { reference: key.clone(), crc32 };
-        let json = serde_json::to_string_pretty(&description).context("cannot describe a reference");
-        let (json, path) = (json.map_err(Failure::Work)?, self.description(key));
+        let form = |e: serde_json::Error| LabError::Form { what: "the JSON of a reference", message: e.to_string() };
+        let (json, path) = (serde_json::to_string_pretty(&description).map_err(form)?, self.description(key));
         // Last, so that what it describes is there.
-        write_atomically(&path, |out| writeln!(out, "{json}"))
-            .with_context(|| format!("cannot write {}", path.display()))
-            .map_err(Failure::Work)
+        write_atomically(&path, |out| writeln!(out, "{json}")).map_err(fail(&path))
     }
 }
 
@@ -166,12 +161,13 @@ fn read_half(path: &Path, key: &Key, crc32: u32) -> Result<Image, String> {
 
 #[cfg(test)]
 mod tests {
-    use vdf_render::{
-        Rgb,
-        scene::{LoadOptions, builtin},
-    };
+    use vdf_image::Rgb;
+    use vdf_scene::LoadOptions;
+    use vdf_scenes::builtin;
 
     use super::*;
+
+    const SEEDS: [u64; 2] = [8, 9];
 
     fn scene(defines: &[(&str, &str)]) -> Scene {
         let defines = defines.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
@@ -189,23 +185,23 @@ mod tests {
     #[test]
     fn keys_tell_references_apart() {
         let small = [("width", "8"), ("height", "8")];
-        let key = |scene: &Scene, setting, spp| Key::new("a/b <c>", scene, setting, spp);
-        let first = key(&scene(&small), Setting::Volpath, 4);
+        let key = |scene: &Scene, setting, spp| Key::new("a/b <c>", scene, setting, spp, SEEDS);
+        let first = key(&scene(&small), Integrator::Volpath, 4);
         assert!(first.stem().starts_with("a-b--c--volpath-8x8+0+0-8-"), "{}", first.stem());
         // The scene's own samples and seed are not used.
-        assert_eq!(first, key(&scene(&[small[0], small[1], ("spp", "7"), ("seed", "9")]), Setting::Volpath, 4));
+        assert_eq!(first, key(&scene(&[small[0], small[1], ("spp", "7"), ("seed", "9")]), Integrator::Volpath, 4));
         let mut moved = scene(&small);
         moved.surfaces[3].triangles[1].vertices[2].x += 1e-4;
         let mut dimmed = scene(&small);
         dimmed.media[0].sigma_t *= 1.0 + f64::EPSILON;
         let others = [
-            key(&scene(&[("width", "9"), ("height", "8")]), Setting::Volpath, 4),
-            key(&scene(&[small[0], small[1], ("max_depth", "3")]), Setting::Volpath, 4),
-            key(&scene(&small), Setting::Raymarch(7), 4),
-            key(&scene(&small), Setting::Raymarch(8), 4),
-            key(&scene(&small), Setting::Volpath, 5),
-            key(&moved, Setting::Volpath, 4),
-            key(&dimmed, Setting::Volpath, 4),
+            key(&scene(&[("width", "9"), ("height", "8")]), Integrator::Volpath, 4),
+            key(&scene(&[small[0], small[1], ("max_depth", "3")]), Integrator::Volpath, 4),
+            key(&scene(&small), Integrator::raymarch(7), 4),
+            key(&scene(&small), Integrator::raymarch(8), 4),
+            key(&scene(&small), Integrator::Volpath, 5),
+            key(&moved, Integrator::Volpath, 4),
+            key(&dimmed, Integrator::Volpath, 4),
         ];
         let mut stems: Vec<String> = others.iter().chain([&first]).map(Key::stem).collect();
         stems.sort();
@@ -217,7 +213,7 @@ mod tests {
     fn what_is_stored_is_found_and_what_is_damaged_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let cache = Cache::open(Some(&folder.path().join("new"))).unwrap();
-        let key = Key::new("fog", &scene(&[("width", "3"), ("height", "2")]), Setting::Volpath, 4);
+        let key = Key::new("fog", &scene(&[("width", "3"), ("height", "2")]), Integrator::Volpath, 4, SEEDS);
         assert_eq!(why(cache.look_up(&key)), "missing");
         let mut halves = [Image::new(3, 2), Image::new(3, 2)];
         halves[0].pixels[4] = Rgb::new(1.0, 1e-30, 3e30);

@@ -22,15 +22,15 @@ pub(super) struct Median {
 }
 
 /// The fewest values with such an interval.
-pub(super) const FEWEST: usize = 5;
+pub(super) const MIN_VALUES: usize = 5;
 
 /// The most; above it the probabilities of few heads are no longer normal numbers in double precision.
-pub(super) const MOST: usize = 1000;
+pub(super) const MAX_VALUES: usize = 1000;
 
 const COVERAGE: f64 = 15.0 / 16.0;
 
 impl MedianRule {
-    /// For `n` values, from [`FEWEST`] to [`MOST`].
+    /// For `n` values, from [`MIN_VALUES`] to [`MAX_VALUES`].
     pub(super) fn new(n: usize) -> Self {
         // P(B = i), and the sum of those below k.
         let mut p = 0.5_f64.powi(n as i32);
@@ -121,7 +121,7 @@ mod tests {
     /// Against sums of binomial coefficients: for each n the largest k that is wide enough.
     #[test]
     fn intervals_have_the_coverage_they_state() {
-        for n in FEWEST..=60 {
+        for n in MIN_VALUES..=60 {
             let choose = |k: usize| (0..k).fold(1_u128, |c, i| c * (n - i) as u128 / (i + 1) as u128);
             let coverage = |k: usize| 1.0 - 2.0 * (0..k).map(choose).sum::<u128>() as f64 / 2_f64.powi(n as i32);
             let rule = MedianRule::new(n);
@@ -132,7 +132,7 @@ mod tests {
         assert_eq!((coverage(5).k, coverage(5).coverage), (1, 0.9375));
         assert_eq!((coverage(7).k, coverage(8).k, coverage(9).k), (1, 1, 2));
         // The normal approximation: k = n/2 − z √n/2, with z = 1.8627 for 15/16.
-        let most = MedianRule::new(MOST);
+        let most = MedianRule::new(MAX_VALUES);
         assert!((most.k as f64 - (500.5 - 1.8627 * 1000_f64.sqrt() / 2.0)).abs() < 1.0, "{most:?}");
         assert!((most.coverage - COVERAGE).abs() < 0.01);
     }

@@ -10,24 +10,19 @@
 //!
 //! *Limits.* Light that neither half has found is in neither the floor nor the reference.
 
-use vdf_render::{
-    Image, RenderError,
+use vdf_image::{
+    Image, ImageError,
     metrics::{PIXELS_PER_DEGREE, hdr_flip, mse, rel_mse},
-    scene::PixelRect,
 };
-
-use super::measure::Setting;
-use crate::failure::Failure;
-
-/// The seeds of the halves.
-pub(super) const SEEDS: [u64; 2] = [u64::MAX - 1, u64::MAX];
+use vdf_render::Integrator;
+use vdf_scene::PixelRect;
 
 /// An error is claimed if it is so many times the bound of the floor: then the floor is at most a third of what remains.
 pub(super) const CLAIM: f64 = 4.0;
 
 /// A converged image.
 pub(super) struct Reference {
-    pub(super) setting: Setting,
+    pub(super) integrator: Integrator,
     /// Samples per pixel, of both halves together.
     pub(super) spp: u32,
     pub(super) image: Image,
@@ -49,11 +44,11 @@ pub(super) struct Floor {
 }
 
 impl Reference {
-    pub(super) fn new(setting: Setting, spp: u32, halves: &[Image; 2], cached: bool) -> Result<Self, Failure> {
+    pub(super) fn new(integrator: Integrator, spp: u32, halves: &[Image; 2], cached: bool) -> Result<Self, ImageError> {
         let image = mean(halves);
         let floor = Floor::new(&image, &halves[0])?;
         let flip = hdr_flip(&halves[0], &halves[1], PIXELS_PER_DEGREE)?.map.mean();
-        Ok(Self { setting, spp, image, floor, flip, cached })
+        Ok(Self { integrator, spp, image, floor, flip, cached })
     }
 
     /// Whether these errors, with the floor, can be told from the reference's own. Both have to: a reference with much noise
@@ -66,7 +61,7 @@ impl Reference {
 
 impl Floor {
     /// Of the mean of two halves, one of which is given: the other lies as far on the other side.
-    fn new(mean: &Image, half: &Image) -> Result<Self, RenderError> {
+    fn new(mean: &Image, half: &Image) -> Result<Self, ImageError> {
         let (mse, rel_mse) = (mse(half, mean)?, rel_mse(half, mean)?);
         let values = || mean.pixels.iter().flat_map(|p| p.to_array()).map(f64::from);
         let m = values().sum::<f64>() / (3 * mean.pixels.len()) as f64;
@@ -134,7 +129,8 @@ pub(super) fn telling_pixels(halves: &[Image; 2]) -> PixelRect {
 
 #[cfg(test)]
 mod tests {
-    use vdf_render::{Rgb, Sampler};
+    use vdf_image::Rgb;
+    use vdf_render::Sampler;
 
     use super::*;
 
@@ -158,7 +154,7 @@ mod tests {
         assert!((floor.rel_mse_bound - 1.5 * first).abs() < 1e-12, "{floor:?}");
         assert_eq!(floor, Floor::new(&mean, &b).unwrap());
         // Halves that agree claim everything but nothing.
-        let exact = Reference::new(Setting::Volpath, 2, &[a.clone(), a.clone()], false).unwrap();
+        let exact = Reference::new(Integrator::Volpath, 2, &[a.clone(), a.clone()], false).unwrap();
         assert_eq!((exact.floor.mse, exact.floor.rel_mse_bound, exact.flip), (0.0, 0.0, 0.0));
         assert!(
             exact.claims(1e-30, 1e-30)
@@ -166,14 +162,14 @@ mod tests {
                 && !exact.claims(f64::NAN, 1.0)
                 && !exact.claims(f64::INFINITY, 1.0)
         );
-        let noisy = Reference::new(Setting::Volpath, 2, &[a, b], false).unwrap();
+        let noisy = Reference::new(Integrator::Volpath, 2, &[a, b], false).unwrap();
         let (least, of_mse) = (CLAIM * noisy.floor.rel_mse_bound, CLAIM * noisy.floor.mse_bound);
         assert!(
             noisy.claims(least, of_mse) && !noisy.claims(0.999 * least, of_mse) && !noisy.claims(least, 0.999 * of_mse)
         );
         // Black is no division by zero.
         let black = Image::new(3, 2);
-        assert_eq!(Reference::new(Setting::Volpath, 2, &[black.clone(), black], false).unwrap().floor.rel_mse, 0.0);
+        assert_eq!(Reference::new(Integrator::Volpath, 2, &[black.clone(), black], false).unwrap().floor.rel_mse, 0.0);
     }
 
     /// Noise of a known variance, uniform with standard deviation s in a half: the floor is s²/2, and an image of variance v against the reference
@@ -189,7 +185,7 @@ mod tests {
                 Rgb::new(draw(), draw(), draw())
             })
         };
-        let reference = Reference::new(Setting::Volpath, 2, &[noisy(1, s), noisy(2, s)], false).unwrap();
+        let reference = Reference::new(Integrator::Volpath, 2, &[noisy(1, s), noisy(2, s)], false).unwrap();
         let floor = reference.floor;
         assert!((floor.mse / (s * s / 2.0) - 1.0).abs() < 0.04, "{floor:?}");
         assert!(floor.mse_bound > floor.mse && floor.mse_bound < 1.05 * floor.mse, "{floor:?}");

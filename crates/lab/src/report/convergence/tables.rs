@@ -1,134 +1,24 @@
 //! What was measured as pictures, plots and tables.
 
-use anyhow::anyhow;
-use vdf_render::{Image, encode_png, scene::FilmSettings};
+use vdf_image::Image;
 
 use super::{
-    curve::{Found, Median, MedianRule, slope, time_to},
-    measure::{Errors, Measured, Plan, SettingResult},
-    reference::{CLAIM, Floor, Reference},
+    curve::{Found, Median},
+    measure::SettingResult,
+    reference::{CLAIM, Reference},
+    summary::Summary,
 };
 use crate::{
-    commands::report::{
+    LabError,
+    report::{
         page::{Cell, Comparison, Page, Picture, Row, Section, Table},
-        percent,
         plot::{Banded, Plot, Series},
-        queries::style,
-        seconds, short,
+        words::{dash, percent, seconds, short},
     },
-    failure::Failure,
 };
 
-/// The relMSE that times are given for.
-pub(super) const TARGETS: [f64; 2] = [1e-2, 1e-3];
-
-pub(super) struct Tables<'a> {
-    pub(super) name: &'a str,
-    pub(super) plan: &'a Plan,
-    pub(super) measured: &'a Measured,
-    film: &'a FilmSettings,
-    pub(super) rule: MedianRule,
-}
-
-/// A method in a setting, medians over the seeds.
-pub(super) struct MethodFigures {
-    pub(super) t_build: Median,
-    /// At each number of samples.
-    pub(super) t_render: Vec<Median>,
-    /// At the most samples, by how much faster than the hierarchy alone, `T_build` left out.
-    pub(super) gain: Median,
-    /// 1/(time × MSE) at the most samples whose error is claimed, without `T_build` and with it.
-    pub(super) efficiency: Option<[Median; 2]>,
-    /// For each target.
-    pub(super) times: [Option<(Median, Found)>; 2],
-}
-
-impl<'a> Tables<'a> {
-    pub(super) fn new(name: &'a str, plan: &'a Plan, measured: &'a Measured, film: &'a FilmSettings) -> Self {
-        Self { name, plan, measured, film, rule: MedianRule::new(plan.seeds.len()) }
-    }
-
-    pub(super) fn reference(&self, s: &SettingResult) -> &Reference {
-        &self.measured.references[s.reference]
-    }
-
-    /// Median over the seeds of an error as measured, with the floor.
-    pub(super) fn as_measured(&self, s: &SettingResult, spp: usize, error: fn(&Errors) -> f64) -> Median {
-        self.rule.of(s.errors.iter().map(|of_seed| error(&of_seed[spp])))
-    }
-
-    pub(super) fn rel_mse(&self, s: &SettingResult, spp: usize) -> Median {
-        self.as_measured(s, spp, |e| e.rel_mse).less(self.reference(s).floor.rel_mse)
-    }
-
-    pub(super) fn mse(&self, s: &SettingResult, spp: usize) -> Median {
-        self.as_measured(s, spp, |e| e.mse).less(self.reference(s).floor.mse)
-    }
-
-    pub(super) fn flip(&self, s: &SettingResult, spp: usize) -> Median {
-        self.as_measured(s, spp, |e| e.flip)
-    }
-
-    /// Whether the errors of so many samples can be told from the reference's own.
-    pub(super) fn is_claimed(&self, s: &SettingResult, spp: usize) -> bool {
-        let median = |error| self.as_measured(s, spp, error).median;
-        self.reference(s).claims(median(|e| e.rel_mse), median(|e| e.mse))
-    }
-
-    /// The places in the plan of all samples whose errors are claimed.
-    fn claimed(&self, s: &SettingResult) -> Vec<usize> {
-        (0..self.plan.spps.len()).filter(|&j| self.is_claimed(s, j)).collect()
-    }
-
-    /// `T_build` + `T_render`.
-    pub(super) fn time(&self, s: &SettingResult, method: usize, spp: usize) -> Median {
-        let t_build = &self.measured.t_build[method];
-        self.rule.of(t_build.iter().zip(&s.t_render[method]).map(|(build, render)| build + render[spp]))
-    }
-
-    pub(super) fn method(&self, s: &SettingResult, method: usize) -> MethodFigures {
-        let Floor { mse, rel_mse, .. } = self.reference(s).floor;
-        let (t_build, t_render) = (&self.measured.t_build[method], &s.t_render[method]);
-        let seeds = 0..self.plan.seeds.len();
-        let last = self.plan.spps.len() - 1;
-        let claimed = self.claimed(s);
-        let efficiency = claimed.last().map(|&j| {
-            [0.0, 1.0].map(|with| {
-                let of = |i: usize| ((t_render[i][j] + with * t_build[i]) * (s.errors[i][j].mse - mse)).recip();
-                self.rule.of(seeds.clone().map(of))
-            })
-        });
-        let times = TARGETS.map(|target| {
-            let of = |i: usize| {
-                let points: Vec<_> =
-                    claimed.iter().map(|&j| (t_render[i][j], s.errors[i][j].rel_mse - rel_mse)).collect();
-                time_to(&points, t_build[i], target)
-            };
-            let all: Vec<_> = seeds.clone().map(of).collect::<Option<_>>()?;
-            let found = all.iter().map(|t| t.1).max()?;
-            Some((self.rule.of(all.iter().map(|t| t.0)), found))
-        });
-        MethodFigures {
-            t_build: self.rule.of(t_build.iter().copied()),
-            t_render: (0..=last).map(|j| self.rule.of(t_render.iter().map(|of_seed| of_seed[j]))).collect(),
-            gain: self.rule.of(seeds.map(|i| s.t_render[0][i][last] / t_render[i][last])),
-            efficiency,
-            times,
-        }
-    }
-
-    /// The exponent of relMSE over samples.
-    pub(super) fn slope(&self, s: &SettingResult) -> Option<Median> {
-        let floor = self.reference(s).floor.rel_mse;
-        let claimed = self.claimed(s);
-        let of = |of_seed: &Vec<Errors>| {
-            let point = |&j: &usize| (f64::from(self.plan.spps[j]), of_seed[j].rel_mse - floor);
-            slope(&claimed.iter().map(point).collect::<Vec<_>>())
-        };
-        Some(self.rule.of(s.errors.iter().map(of).collect::<Option<Vec<_>>>()?))
-    }
-
-    pub(super) fn page(&self) -> Result<Page, Failure> {
+impl Summary<'_> {
+    pub(super) fn page(&self) -> Result<Page, LabError> {
         let Self { plan, measured, film, .. } = self;
         let (first, last) = (plan.seeds.first().unwrap_or(&0), plan.seeds.last().unwrap_or(&0));
         let samples: Vec<_> = plan.spps.iter().map(u32::to_string).collect();
@@ -159,13 +49,13 @@ impl<'a> Tables<'a> {
         Ok(Page { title: format!("Speed against error in {}", self.name), lead, sections })
     }
 
-    fn pictures(&self) -> Result<Section, Failure> {
+    fn pictures(&self) -> Result<Section, LabError> {
         let comparison = |s: &SettingResult, image: &Image, spp: u32| {
             let reference = self.reference(s);
             Ok(Comparison {
-                caption: format!("{}: {spp} against {} samples per pixel", s.setting, reference.spp),
-                left: picture(image, format!("{spp} spp"))?,
-                right: picture(&reference.image, format!("reference, {} spp", reference.spp))?,
+                caption: format!("{}: {spp} against {} samples per pixel", s.integrator, reference.spp),
+                left: Picture::new(image, format!("{spp} spp"))?,
+                right: Picture::new(&reference.image, format!("reference, {} spp", reference.spp))?,
             })
         };
         let mut comparisons = Vec::new();
@@ -175,7 +65,7 @@ impl<'a> Tables<'a> {
                 comparisons.push(comparison(s, &s.last, most));
             }
         }
-        let comparisons = comparisons.into_iter().collect::<Result<_, Failure>>()?;
+        let comparisons = comparisons.into_iter().collect::<Result<_, LabError>>()?;
         Ok(Section { heading: "Pictures".to_owned(), comparisons, ..Section::default() })
     }
 
@@ -183,7 +73,7 @@ impl<'a> Tables<'a> {
         let row = |r: &Reference| {
             let f = &r.floor;
             let cells = [
-                r.setting.to_string(),
+                r.integrator.to_string(),
                 r.spp.to_string(),
                 format!("{:.2e}", f.mse),
                 format!("{:.2e}", f.rel_mse),
@@ -220,7 +110,7 @@ impl<'a> Tables<'a> {
         let mut paragraphs = Vec::new();
         if claimed.is_empty() {
             paragraphs.push(
-                "No error can be told from that of the reference: it needs more samples (--reference-spp), or the renders fewer."
+                "No error can be told from that of the reference: it needs more samples, or the renders fewer."
                     .to_owned(),
             );
         }
@@ -236,7 +126,7 @@ impl<'a> Tables<'a> {
             Plot::logarithmic("FLIP".to_owned(), TIME, "FLIP", curves(&|j| self.flip(s, j))),
         ];
         Section {
-            heading: s.setting.to_string(),
+            heading: s.integrator.to_string(),
             paragraphs,
             plots: plots.into_iter().flatten().collect(),
             tables: vec![self.methods_table(s), self.errors_table(s)],
@@ -255,7 +145,7 @@ impl<'a> Tables<'a> {
         let at =
             |end: fn(&Median) -> f64| claimed.iter().map(|&j| (end(&self.time(s, m, j)), end(&value(j)))).collect();
         let title = if m == 0 { "hierarchy alone" } else { name };
-        let series = Series { name: title.to_owned(), points: at(|t| t.median), ..style(name) };
+        let series = Series { name: title.to_owned(), points: at(|t| t.median), ..Series::in_style_of(name) };
         Banded { series, low: at(|t| t.low), high: at(|t| t.high) }
     }
 
@@ -291,7 +181,7 @@ impl<'a> Tables<'a> {
             "to relMSE 0.01",
             "to relMSE 0.001",
         ];
-        Table { caption: format!("{}: time", s.setting), columns, rows }
+        Table { caption: format!("{}: time", s.integrator), columns, rows }
     }
 
     fn errors_table(&self, s: &SettingResult) -> Table {
@@ -310,7 +200,7 @@ impl<'a> Tables<'a> {
             })
             .collect();
         let columns = vec!["spp", "relMSE", "MSE", "FLIP", "claimed"];
-        Table { caption: format!("{}: errors", s.setting), columns, rows }
+        Table { caption: format!("{}: errors", s.integrator), columns, rows }
     }
 
     /// The samples per segment side by side, where there are several.
@@ -320,7 +210,7 @@ impl<'a> Tables<'a> {
         let r = (0..self.measured.references.len()).find(|&r| of(r).count() > 1)?;
         let lines = of(r).enumerate().map(|(i, s)| {
             let Banded { series, low, high } = self.curve(s, m, &self.claimed(s), &|j| self.rel_mse(s, j));
-            let series = Series { name: s.setting.to_string(), colour: i, dash: i / 6, ..series };
+            let series = Series { name: s.integrator.to_string(), colour: i, dash: i / 6, ..series };
             Banded { series, low, high }
         });
         let method = self.plan.methods[m];
@@ -344,7 +234,7 @@ impl<'a> Tables<'a> {
             };
             format!(
                 "{}: to the same error faster than the hierarchy alone: {}; slower: {}; not told apart: {}.",
-                s.setting,
+                s.integrator,
                 named(&|g| g.low > 1.0),
                 named(&|g| g.high < 1.0),
                 named(&|g| g.low <= 1.0 && g.high >= 1.0)
@@ -362,16 +252,6 @@ impl<'a> Tables<'a> {
 /// The axis of time.
 const TIME: &str = "T_build + T_render, s";
 
-impl Median {
-    fn less(self, floor: f64) -> Self {
-        Self { median: self.median - floor, low: self.low - floor, high: self.high - floor }
-    }
-}
-
-fn dash() -> String {
-    "–".to_owned()
-}
-
 fn spread(m: &Median, number: impl Fn(f64) -> String) -> String {
     format!("{} ({} to {})", number(m.median), number(m.low), number(m.high))
 }
@@ -383,9 +263,4 @@ fn time_in_words(t: Median, found: Found) -> String {
         Found::Between => words,
         Found::Beyond => format!("{words}, extrapolated"),
     }
-}
-
-fn picture(image: &Image, caption: String) -> Result<Picture, Failure> {
-    let png = encode_png(image).map_err(|e| Failure::Work(anyhow!("{caption}: {e}")))?;
-    Ok(Picture::png(&png, [image.width, image.height], caption))
 }

@@ -1,16 +1,18 @@
 //! Cost against the number of point lights.
 
-use vdf_render::{Method, Rgb, default_voxel_size, scene::Emitter};
+use vdf_render::{Integrator, default_voxel_size};
+use vdf_scene::{Emitter, Rgb, Scene};
+use vdf_visibility::Method;
 
 use super::{
-    measure::{Lab, Phase, method},
+    measure::{Lab, NEIGHBOURHOODS, method},
     sweep::{Group, Sweep, Unit, halvings},
 };
-use crate::failure::Failure;
+use crate::LabError;
 
 const SCENE: &str = "cbox_vol2";
 
-pub(super) const MOST: u32 = 1024;
+pub(super) const MAX_LIGHTS: u32 = 1024;
 
 /// Where the lights are: in the upper part of the room, above the blocks.
 const CORNERS: [[f64; 3]; 2] = [[30.0, 350.0, 30.0], [520.0, 530.0, 530.0]];
@@ -32,52 +34,52 @@ fn position(i: u32) -> [f64; 3] {
     })
 }
 
-pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
-    let (none, sn, xsn) = (Method::None, method("amr-sn")?, Method::default());
+pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
+    let (none, sn, xsn) = (Method::NONE, method("amr-sn"), Method::default());
     let neighbourhoods = [("sn", "amr-sn"), ("xsn", "amr-xsn")];
     let mut build = Group::new("Time to build all neighbourhoods", Unit::Seconds, &neighbourhoods);
     let mut memory = Group::new("Memory of all neighbourhoods", Unit::Bytes, &neighbourhoods);
     let all = [("none", "none"), ("amr-sn", "amr-sn"), ("amr-xsn", "amr-xsn")];
     let mut render = Group::new("Time to render, without building", Unit::Seconds, &all);
     let mut share = Group::new("p_acc|sp", Unit::Share, &all[1..]);
-    let mut scene = lab.builtin(SCENE)?;
-    for n in sizes(lab.settings.max_lights) {
+    let scene = lab.builtin(SCENE)?;
+    for n in sizes(lab.options.max_lights) {
         lab.step("lights", n);
         let x = n as f64;
         let intensity = Rgb::splat(INTENSITY / x as f32);
         let light = |i| Emitter::Point { position: position(i).into(), intensity };
-        scene.emitters = (0..n as u32).map(light).collect();
-        let ready = lab.ready(scene);
-        let size = default_voxel_size(ready.world.bounds);
-        let builds = lab.builds(&ready, &[sn, xsn], size, &lab.pool)?;
+        let emitters = (0..n as u32).map(light).collect();
+        let alone = lab.prepare(Scene { emitters, ..scene.clone() })?;
+        let size = default_voxel_size(&alone.world().bounds);
+        let threads = lab.options.threads;
+        let builds = lab.builds(&alone, &[sn, xsn], size, threads)?;
         for (name, from) in [("sn", sn), ("xsn", xsn)] {
-            build.push(name, x, &builds.seconds(from, Phase::Neighbourhoods));
-            memory.push(name, x, &builds.bytes(from, Phase::Neighbourhoods));
+            build.push(name, x, &builds.seconds(from, NEIGHBOURHOODS));
+            memory.push(name, x, &builds.bytes(from, NEIGHBOURHOODS));
         }
-        let built = [none, sn, xsn].map(|m| lab.build(&ready, m, size, &lab.pool));
-        let built = built.into_iter().collect::<Result<Vec<_>, Failure>>()?;
-        let renders = lab.renders(&ready, &built, lab.settings.threads, &mut None)?;
+        let built = [none, sn, xsn].map(|m| lab.build(&alone, m, size, threads));
+        let built = built.into_iter().collect::<Result<Vec<_>, LabError>>()?;
+        let renders = lab.renders(&built, threads, &mut None)?;
         for (built, (seconds, statistics)) in built.iter().zip(&renders) {
-            render.push(built.method.name(), x, seconds);
-            if let Some(p) = statistics.p_accelerated_given_spatial.filter(|_| built.method != none) {
-                share.push(built.method.name(), x, &[p]);
+            render.push(built.method().name(), x, seconds);
+            if let Some(p) = statistics.p_accelerated_given_spatial.filter(|_| built.method() != none) {
+                share.push(built.method().name(), x, &[p]);
             }
         }
-        scene = ready.scene;
         lab.done();
     }
     Ok(Sweep {
         name: "lights",
         heading: "Lights",
         paragraphs: vec![format!(
-            "{SCENE} with point lights in the upper part of the room, which together are as bright as its own; a 128th of the scene's longest side is the \
-             side of a voxel. One light is drawn for each sample, so a render asks as many queries of 64 lights as of one; what may grow are misses of the caches. Images \
-             of {} × {} pixels, {} samples each; the three methods' were the same bit by bit.",
-            lab.settings.size, lab.settings.size, lab.settings.spp
+            "{SCENE} with point lights in the upper part of the room, which together are as bright as its own; a 128th of the \
+             scene's longest side is the side of a voxel. One light is drawn for each sample, so a render asks as many queries of 64 \
+             lights as of one; what may grow are misses of the caches. Images of {} × {} pixels, {} samples each; the three methods' were the same bit by bit.",
+            lab.options.size, lab.options.size, lab.options.spp
         )],
         against: "lights",
         scene: SCENE,
-        integrator: super::integrator_name(None),
+        integrator: Integrator::Volpath.to_string(),
         groups: vec![build, memory, render, share],
     })
 }

@@ -1,6 +1,6 @@
 //! What a sweep measured: lines of medians against what was varied.
 
-use super::fit::PowerLaw;
+use super::{super::bench::median, fit::PowerLaw};
 
 /// One thing varied, several quantities measured against it.
 #[derive(Clone, Debug)]
@@ -70,8 +70,7 @@ impl Group {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         if let (Some(line), [least, .., most] | [least @ most]) = (line, &sorted[..]) {
-            let n = sorted.len();
-            let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
+            let median = median(values);
             line.points.push(Point { x, median, least: *least, most: *most });
         }
     }

@@ -1,12 +1,11 @@
 //! Sweeps as tables, plots and figures.
 
 use super::sweep::{Group, Line, Sweep, Unit};
-use crate::commands::report::{
+use crate::report::{
     figures::{About, Figure},
     page::{Cell, Row, Section, Table},
-    percent,
     plot::{COLOURS, Plot, Series},
-    seconds, short,
+    words::{dash, percent, seconds, short},
 };
 
 pub(super) fn section(sweep: &Sweep) -> Section {
@@ -22,7 +21,7 @@ pub(super) fn section(sweep: &Sweep) -> Section {
 /// A row for each x, and the fits below.
 fn table(sweep: &Sweep, group: &Group) -> Table {
     let columns = std::iter::once(sweep.against).chain(group.lines.iter().map(|l| l.name)).collect();
-    let value = |line: &Line, x| line.at(x).map_or_else(|| "–".to_owned(), |p| in_words(group.unit, p.median));
+    let value = |line: &Line, x| line.at(x).map_or_else(dash, |p| in_words(group.unit, p.median));
     let mut rows: Vec<Row> = group
         .xs()
         .into_iter()
@@ -33,7 +32,7 @@ fn table(sweep: &Sweep, group: &Group) -> Table {
         .collect();
     if group.unit.fitted() {
         let fits: Vec<_> = group.lines.iter().map(Line::fit).collect();
-        let slope = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.2}"));
+        let slope = |x: Option<f64>| x.map_or_else(dash, |x| format!("{x:.2}"));
         let mut row = |name: &str, of: fn(&super::fit::PowerLaw) -> Option<f64>| {
             let cells = fits.iter().map(|f| slope(f.as_ref().and_then(of)).into());
             let first = name == "exponent";

@@ -1,14 +1,13 @@
 //! Time against the number of threads.
 
-use anyhow::anyhow;
-use vdf_render::Method;
+use vdf_render::Integrator;
+use vdf_visibility::Method;
 
 use super::{
-    super::bench::pool,
-    measure::{Lab, Phase, method},
+    measure::{FIELD, Lab, method},
     sweep::{Group, Sweep, Unit, halvings},
 };
-use crate::failure::Failure;
+use crate::LabError;
 
 const SCENE: &str = "san-miguel";
 
@@ -25,7 +24,7 @@ pub(super) fn sizes(most: usize) -> Vec<usize> {
 
 const FIELDS: [(&str, &str); 4] = [("ndf", "ndf"), ("amr", "amr-xsn"), ("dsz", "dsz"), ("dual", "dual")];
 
-pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
+pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
     let xsn = Method::default();
     let mut time = Group::new(
         "Time",
@@ -42,35 +41,30 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
         ],
     );
     let scene = lab.builtin(SCENE)?;
-    let ready = lab.ready(scene);
-    let (min, max) = ready.world.bounds;
-    let size = (max - min).max_element() / f64::from(lab.settings.voxels_for_threads);
+    let alone = lab.prepare(scene)?;
+    let size = alone.world().bounds.extent().max_element() / f64::from(lab.options.voxels_for_threads);
     let mut image = None;
     let mut proved = None;
-    let methods = FIELDS.iter().map(|(_, from)| method(from)).collect::<Result<Vec<_>, Failure>>()?;
-    for threads in sizes(lab.settings.max_threads) {
+    let methods = FIELDS.map(|(_, from)| method(from));
+    for threads in sizes(lab.options.max_threads) {
         lab.step("threads", threads);
         let x = threads as f64;
-        let pool = pool(Some(threads))?;
-        time.push("hierarchy", x, &lab.hierarchies(&ready.world, &pool)?);
-        let builds = lab.builds(&ready, &methods, size, &pool)?;
+        time.push("hierarchy", x, &lab.hierarchies(alone.world(), Some(threads))?);
+        let builds = lab.builds(&alone, &methods, size, Some(threads))?;
         time.push("voxelization", x, &builds.voxelization());
         for ((name, _), &field) in FIELDS.iter().zip(&methods) {
-            time.push(name, x, &builds.seconds(field, Phase::Field));
+            time.push(name, x, &builds.seconds(field, FIELD));
         }
-        let built = [Method::None, xsn].map(|m| lab.build(&ready, m, size, &pool));
-        let built = built.into_iter().collect::<Result<Vec<_>, Failure>>()?;
-        let renders = lab.renders(&ready, &built, Some(threads), &mut image)?;
+        let built = [Method::NONE, xsn].map(|m| lab.build(&alone, m, size, Some(threads)));
+        let built = built.into_iter().collect::<Result<Vec<_>, LabError>>()?;
+        let renders = lab.renders(&built, Some(threads), &mut image)?;
         for (name, (seconds, statistics)) in ["render, none", "render, amr-xsn"].into_iter().zip(&renders) {
             time.push(name, x, seconds);
             if statistics.method == xsn.name() {
                 // Proofs do not show in the image; a field that is not the same shows in their number.
                 let expected = *proved.get_or_insert(statistics.proved);
                 if statistics.proved != expected {
-                    return Err(Failure::Work(anyhow!(
-                        "WRONG PROOFS: {threads} threads prove {} queries, one thread {expected}. Please report it with this command",
-                        statistics.proved
-                    )));
+                    return Err(LabError::WrongProofs { threads, found: statistics.proved, expected });
                 }
             }
         }
@@ -83,15 +77,15 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
         paragraphs: vec![format!(
             "{SCENE}, {} triangles, its longest side {} voxels; images of {} × {} pixels, {} samples each. With threads that do not wait for \
              each other the exponent is -1 and the efficiency 1. All images were the same bit by bit, and amr-xsn proved the same number of queries.",
-            ready.world.triangles.len(),
-            lab.settings.voxels_for_threads,
-            lab.settings.size,
-            lab.settings.size,
-            lab.settings.spp
+            alone.world().triangles.len(),
+            lab.options.voxels_for_threads,
+            lab.options.size,
+            lab.options.size,
+            lab.options.spp
         )],
         against: "threads",
         scene: SCENE,
-        integrator: super::integrator_name(None),
+        integrator: Integrator::Volpath.to_string(),
         groups: vec![time, efficiency],
     })
 }

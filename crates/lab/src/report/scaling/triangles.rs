@@ -1,47 +1,48 @@
 //! Cost against the number of triangles.
 
-use vdf_render::{
-    Method, Triangle, default_voxel_size,
-    scene::{GeneratedScene, Scene, SceneSource, generated},
-};
+use vdf_geometry::Triangle;
+use vdf_render::default_voxel_size;
+use vdf_scene::{Scene, SceneSource};
+use vdf_scenes::{GeneratedScene, generated};
+use vdf_visibility::{Method, QueryKind};
 
 use super::{
-    measure::{Lab, Phase, SAMPLES_PER_SEGMENT, methods},
+    super::words::grid,
+    measure::{FIELD, Lab, NEIGHBOURHOODS, RECORDED, methods},
     sweep::{Group, Sweep, Unit, halvings},
 };
-use crate::failure::Failure;
-use anyhow::anyhow;
+use crate::{LabError, queries::Timing};
 
 const SCENE: &str = "san-miguel";
 
 /// The generator makes no fewer: it could not make all of the court.
-pub(super) const LEAST: u64 = GeneratedScene::MIN_TRIANGLES as u64;
-pub(super) const MOST: u64 = GeneratedScene::MAX_TRIANGLES as u64;
+pub(super) const MIN_TRIANGLES: u64 = GeneratedScene::MIN_TRIANGLES as u64;
+pub(super) const MAX_TRIANGLES: u64 = GeneratedScene::MAX_TRIANGLES as u64;
 
 /// The parts of [`refine`]d boxes; a split makes four of one.
 const REFINED: &str = "cbox_vol2";
-const FEWEST_SPLITS: u32 = 4;
+const MIN_SPLITS: u32 = 4;
 
 const FIELDS: [&str; 4] = ["ndf", "amr-xsn", "dsz", "dual"];
 const REPLAYED: [&str; 2] = ["amr", "amr-xsn"];
 
 pub(super) fn sizes(most: u64) -> Vec<u64> {
-    halvings(LEAST, most)
+    halvings(MIN_TRIANGLES, most)
 }
 
 /// Shapes get finer and there are more of them: a scene that is made with more detail.
-pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
-    let mut curves = Curves::new()?;
-    for n in sizes(lab.settings.max_triangles) {
+pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
+    let mut curves = Curves::new();
+    for n in sizes(lab.options.max_triangles) {
         lab.step("triangles", n);
-        let scene = generated(SCENE).ok_or_else(|| Failure::Work(anyhow!("no scene is called '{SCENE}'")))?;
+        let scene = generated(SCENE).ok_or_else(|| LabError::UnknownScene(SCENE.to_owned()))?;
         let scene = scene.with_triangles(u32::try_from(n).unwrap_or(u32::MAX))?;
         curves.measure(lab, lab.load(&SceneSource::from(scene))?)?;
         lab.done();
     }
     let paragraphs = vec![
         format!(
-            "{SCENE} generated in several sizes, from {LEAST} triangles, the fewest of which the court can be made; in {} voxels \
+            "{SCENE} generated in several sizes, from {MIN_TRIANGLES} triangles, the fewest of which the court can be made; in {} voxels \
              whatever its size. Shapes get finer and leaves more: neither the occupied voxels nor p_acc|sp are the same in all sizes. xsn is the neighbourhood of its one point light.",
             curves.grid
         ),
@@ -55,13 +56,13 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, Failure> {
 /// How often each triangle is split, for each size.
 pub(super) fn splits(most: u64) -> Vec<u32> {
     // 30 triangles, of the room and its two blocks.
-    (FEWEST_SPLITS..).take_while(|&k| 30 << (2 * k) <= most).collect()
+    (MIN_SPLITS..).take_while(|&k| 30 << (2 * k) <= most).collect()
 }
 
 /// The same shapes in more and more triangles: nothing else changes.
-pub(super) fn run_refined(lab: &Lab<'_>) -> Result<Sweep, Failure> {
-    let mut curves = Curves::new()?;
-    for k in splits(lab.settings.max_triangles) {
+pub(super) fn run_refined(lab: &Lab<'_>) -> Result<Sweep, LabError> {
+    let mut curves = Curves::new();
+    for k in splits(lab.options.max_triangles) {
         let mut scene = lab.builtin(REFINED)?;
         for surface in &mut scene.surfaces {
             surface.triangles = (0..k).fold(std::mem::take(&mut surface.triangles), |all, _| refine(&all));
@@ -90,8 +91,6 @@ fn refine(triangles: &[Triangle]) -> Vec<Triangle> {
 
 /// Everything that is measured in scenes of several sizes.
 struct Curves {
-    fields: Vec<Method>,
-    replayed: Vec<Method>,
     build: Group,
     memory: Group,
     query: Group,
@@ -101,7 +100,7 @@ struct Curves {
 }
 
 impl Curves {
-    fn new() -> Result<Self, Failure> {
+    fn new() -> Self {
         let build = [
             ("hierarchy", ""),
             ("voxelization", ""),
@@ -119,46 +118,47 @@ impl Curves {
             ("t_eff, amr-xsn", "amr-xsn"),
         ];
         let share = [("occupied", ""), ("amr", "amr"), ("amr-xsn", "amr-xsn")];
-        Ok(Self {
-            fields: methods(&FIELDS)?,
-            replayed: methods(&REPLAYED)?,
+        Self {
             build: Group::new("Time to build", Unit::Seconds, &build),
             memory: Group::new("Memory", Unit::Bytes, &[("hierarchy", ""), ("amr-xsn, all", "amr-xsn")]),
             query: Group::new("A spatial query", Unit::Nanoseconds, &query),
             share: Group::new("Occupied voxels, and p_acc|sp", Unit::Share, &share),
             grid: String::new(),
-        })
+        }
     }
 
-    fn measure(&mut self, lab: &Lab<'_>, scene: Scene) -> Result<(), Failure> {
-        let Self { fields, replayed, build, memory, query, share, grid } = self;
-        let ready = lab.ready(scene);
-        let x = ready.world.triangles.len() as f64;
-        let size = default_voxel_size(ready.world.bounds);
-        build.push("hierarchy", x, &lab.hierarchies(&ready.world, &lab.pool)?);
-        memory.push("hierarchy", x, &[ready.world.bvh.bytes() as f64]);
+    fn measure(&mut self, lab: &Lab<'_>, scene: Scene) -> Result<(), LabError> {
+        let Self { build, memory, query, share, grid: resolution } = self;
+        let alone = lab.prepare(scene)?;
+        let world = alone.world();
+        let x = world.triangles.len() as f64;
+        let size = default_voxel_size(&world.bounds);
+        let threads = lab.options.threads;
+        build.push("hierarchy", x, &lab.hierarchies(world, threads)?);
+        memory.push("hierarchy", x, &[world.bvh.bytes() as f64]);
 
-        let builds = lab.builds(&ready, fields, size, &lab.pool)?;
+        let fields = methods(FIELDS);
+        let builds = lab.builds(&alone, &fields, size, threads)?;
         build.push("voxelization", x, &builds.voxelization());
-        for &field in fields.iter() {
+        for field in fields {
             let name = field.name().split('-').next().unwrap_or_default();
-            build.push(name, x, &builds.seconds(field, Phase::Field));
+            build.push(name, x, &builds.seconds(field, FIELD));
         }
         let xsn = Method::default();
-        build.push("xsn", x, &builds.seconds(xsn, Phase::Neighbourhoods));
-        let bytes = [Phase::Voxels, Phase::Field, Phase::Neighbourhoods].map(|p| builds.bytes(xsn, p));
-        memory.push("amr-xsn, all", x, &[bytes.iter().flatten().sum()]);
+        build.push("xsn", x, &builds.seconds(xsn, NEIGHBOURHOODS));
+        memory.push("amr-xsn, all", x, &[builds.all_bytes(xsn)]);
 
         share.push("occupied", x, &[builds.occupied_share()]);
 
-        let replay = lab.replay(&ready, replayed, size)?;
-        let timing = |t: vdf_render::queries::Timing| [t.min, t.median, t.max];
-        query.push("t_query, hierarchy", x, &timing(replay.hierarchy.t_spatial));
-        for m in &replay.methods {
-            query.push(&format!("t_acc, {}", m.method), x, &timing(m.t_acc));
-            query.push(&format!("t_eff, {}", m.method), x, &timing(m.t_effective));
-            share.push(m.method, x, &[m.p_accelerated_given_spatial]);
-            *grid = super::grid(m.grid);
+        let replay = lab.replay(&alone, &methods(REPLAYED), size)?;
+        let timing = |t: Timing| [t.min, t.median, t.max];
+        let spatial = replay.hierarchy.class(QueryKind::Spatial).map(|c| timing(c.time));
+        query.push("t_query, hierarchy", x, &spatial.unwrap_or_default());
+        for (m, p) in replay.methods.iter().filter_map(|m| Some((m, m.spatial()?))) {
+            query.push(&format!("t_acc, {}", m.method), x, &timing(p.t_acc));
+            query.push(&format!("t_eff, {}", m.method), x, &timing(p.t_effective));
+            share.push(m.method, x, &[p.p_accelerated]);
+            *resolution = grid(m.grid);
         }
         Ok(())
     }
@@ -170,7 +170,7 @@ impl Curves {
             paragraphs,
             against: "triangles",
             scene,
-            integrator: super::integrator_name(Some(SAMPLES_PER_SEGMENT)),
+            integrator: RECORDED.to_string(),
             groups: vec![self.build, self.memory, self.query, self.share],
         }
     }
@@ -178,8 +178,10 @@ impl Curves {
 
 #[cfg(test)]
 mod tests {
+    use vdf_scene::LoadOptions;
+    use vdf_scenes::builtin;
+
     use super::*;
-    use vdf_render::scene::{LoadOptions, builtin};
 
     #[test]
     fn a_refined_box_is_the_same_box() {

@@ -1,7 +1,9 @@
-//! What the thesis has: see `data/thesis/README.md`.
+//! What the thesis has: see `data/thesis/README.md` in the folder of this crate.
 
-use anyhow::Context as _;
-use serde::{Deserialize, de::DeserializeOwned};
+use serde::{Deserialize, Deserializer, de::DeserializeOwned};
+use vdf_render::Integrator;
+
+use crate::LabError;
 
 /// Its tables.
 #[derive(Debug)]
@@ -19,7 +21,8 @@ pub(super) struct Acceleration {
     pub(super) scene: String,
     pub(super) method: String,
     pub(super) voxel_size: f64,
-    pub(super) samples_per_segment: Option<u32>,
+    #[serde(rename = "samples_per_segment", deserialize_with = "integrator")]
+    pub(super) integrator: Integrator,
     pub(super) t_render: f64,
     pub(super) t_query: f64,
     pub(super) t_build: Option<f64>,
@@ -32,7 +35,8 @@ pub(super) struct Acceleration {
 #[derive(Clone, Debug, Deserialize)]
 pub(super) struct Queries {
     pub(super) scene: String,
-    pub(super) samples_per_segment: Option<u32>,
+    #[serde(rename = "samples_per_segment", deserialize_with = "integrator")]
+    pub(super) integrator: Integrator,
     pub(super) n: f64,
     pub(super) p_sp: f64,
 }
@@ -52,7 +56,8 @@ pub(super) struct ProofTime {
 pub(super) struct Repeated {
     pub(super) scene: String,
     pub(super) voxel_size: f64,
-    pub(super) samples_per_segment: Option<u32>,
+    #[serde(rename = "samples_per_segment", deserialize_with = "integrator")]
+    pub(super) integrator: Integrator,
     pub(super) samples_per_pixel: u32,
     pub(super) t_build: f64,
     pub(super) t_render: f64,
@@ -64,7 +69,8 @@ pub(super) struct Repeated {
 pub(super) struct Measured {
     pub(super) scene: String,
     pub(super) voxel_size: f64,
-    pub(super) samples_per_segment: Option<u32>,
+    #[serde(rename = "samples_per_segment", deserialize_with = "integrator")]
+    pub(super) integrator: Integrator,
     pub(super) samples_per_pixel: u32,
     pub(super) t_render_with: f64,
     pub(super) t_query: f64,
@@ -72,13 +78,13 @@ pub(super) struct Measured {
 }
 
 impl ThesisData {
-    pub(super) fn load() -> anyhow::Result<Self> {
+    pub(super) fn load() -> Result<Self, LabError> {
         Ok(Self {
-            acceleration: rows(include_str!("../../../../data/thesis/acceleration.csv"))?,
-            queries: rows(include_str!("../../../../data/thesis/queries.csv"))?,
-            proof_times: rows(include_str!("../../../../data/thesis/proof_times.csv"))?,
-            repeated: rows(include_str!("../../../../data/thesis/repeated.csv"))?,
-            measured: rows(include_str!("../../../../data/thesis/measured.csv"))?,
+            acceleration: rows(include_str!("../../../data/thesis/acceleration.csv"))?,
+            queries: rows(include_str!("../../../data/thesis/queries.csv"))?,
+            proof_times: rows(include_str!("../../../data/thesis/proof_times.csv"))?,
+            repeated: rows(include_str!("../../../data/thesis/repeated.csv"))?,
+            measured: rows(include_str!("../../../data/thesis/measured.csv"))?,
         })
     }
 
@@ -88,18 +94,18 @@ impl ThesisData {
         scene: &str,
         method: &str,
         size: f64,
-        samples: Option<u32>,
+        integrator: Integrator,
     ) -> Option<&Acceleration> {
         self.acceleration.iter().find(|r| {
             r.scene == scene
                 && r.method == method
-                && r.samples_per_segment == samples
+                && r.integrator == integrator
                 && (method == "none" || r.voxel_size == size)
         })
     }
 
-    pub(super) fn queries(&self, scene: &str, samples: Option<u32>) -> Option<&Queries> {
-        self.queries.iter().find(|r| r.scene == scene && r.samples_per_segment == samples)
+    pub(super) fn queries(&self, scene: &str, integrator: Integrator) -> Option<&Queries> {
+        self.queries.iter().find(|r| r.scene == scene && r.integrator == integrator)
     }
 
     pub(super) fn proof_time(&self, scene: &str, method: &str, size: f64) -> Option<&ProofTime> {
@@ -120,25 +126,28 @@ impl ThesisData {
     }
 }
 
-fn rows<T: DeserializeOwned>(text: &str) -> anyhow::Result<Vec<T>> {
-    csv::Reader::from_reader(text.as_bytes())
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .context("the figures of the thesis inside this program cannot be read")
+/// Samples per segment; a row without is about the path tracer.
+fn integrator<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Integrator, D::Error> {
+    Ok(Option::<u32>::deserialize(deserializer)?.map_or(Integrator::Volpath, Integrator::raymarch))
+}
+
+fn rows<T: DeserializeOwned>(text: &str) -> Result<Vec<T>, LabError> {
+    let rows = csv::Reader::from_reader(text.as_bytes()).deserialize().collect::<Result<_, _>>();
+    rows.map_err(|e| LabError::Form { what: "tables of the thesis's figures", message: e.to_string() })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{super::SCENES, super::SETTINGS, *};
+    use super::{super::INTEGRATORS, super::SCENES, *};
 
     /// The inner relations of the thesis's own tables, and some figures as printed.
     #[test]
     fn the_data_is_complete_and_consistent() {
         let thesis = ThesisData::load().unwrap();
         for scene in SCENES {
-            for samples in SETTINGS {
-                let queries = thesis.queries(scene.name, samples).unwrap();
-                let none = thesis.acceleration(scene.name, "none", 0.0, samples).unwrap();
+            for integrator in INTEGRATORS {
+                let queries = thesis.queries(scene.name, integrator).unwrap();
+                let none = thesis.acceleration(scene.name, "none", 0.0, integrator).unwrap();
                 assert_eq!(none.p_sp, queries.p_sp);
                 assert!(none.t_query < none.t_render && none.t_build.is_none());
                 for method in ["ndf", "amr", "amr-sn"] {
@@ -146,7 +155,7 @@ mod tests {
                     let rows: Vec<_> = scene
                         .sizes
                         .iter()
-                        .filter_map(|&size| thesis.acceleration(scene.name, method, size, samples))
+                        .filter_map(|&size| thesis.acceleration(scene.name, method, size, integrator))
                         .collect();
                     assert_eq!(rows.len(), if (scene.name, method) == ("scape", "amr-sn") { 0 } else { 3 });
                     for (row, size) in rows.iter().zip(scene.sizes) {
@@ -171,8 +180,8 @@ mod tests {
             assert!((100.0 * row.t_acc / t_query - row.ratio).abs() < 1.0, "{row:?}");
         }
         assert_eq!(thesis.proof_time("cbox_vol6", "amr-sn", 8.0).unwrap().t_acc, 14.0);
-        assert_eq!(thesis.queries("scape", Some(49)).unwrap().n, 58_220_000.0);
-        assert_eq!(thesis.acceleration("san-miguel", "amr", 0.5, None).unwrap().p_acc_sp, Some(9.46));
+        assert_eq!(thesis.queries("scape", Integrator::raymarch(49)).unwrap().n, 58_220_000.0);
+        assert_eq!(thesis.acceleration("san-miguel", "amr", 0.5, Integrator::Volpath).unwrap().p_acc_sp, Some(9.46));
         assert_eq!((thesis.repeated.len(), thesis.repeated_settings().len(), thesis.measured.len()), (24, 3, 3));
     }
 }

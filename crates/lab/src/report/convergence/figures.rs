@@ -4,18 +4,18 @@ use super::{
     curve::{Found, Median},
     measure::SettingResult,
     reference::Floor,
-    tables::Tables,
+    summary::Summary,
 };
-use crate::commands::report::figures::{About, Figure};
+use crate::report::figures::{About, Figure};
 
 /// Names of a median and of the ends of its interval.
 type Names = [&'static str; 3];
 
-impl Tables<'_> {
+impl Summary<'_> {
     pub(super) fn figures(&self) -> Vec<Figure> {
         let mut all = Vec::new();
         for r in &self.measured.references {
-            let about = self.about("reference", r.setting.to_string(), "none", None);
+            let about = self.about("reference", r.integrator.to_string(), "none", None);
             let Floor { mse, rel_mse, mse_bound, rel_mse_bound } = r.floor;
             let figures = [
                 ("MSE floor", mse),
@@ -40,7 +40,7 @@ impl Tables<'_> {
     }
 
     fn errors(&self, s: &SettingResult, all: &mut Vec<Figure>) {
-        let about = self.about("error", s.setting.to_string(), "", None);
+        let about = self.about("error", s.integrator.to_string(), "", None);
         for (j, &spp) in self.plan.spps.iter().enumerate() {
             let mut three = |names: Names, m: Median| {
                 all.extend(of_median(&about, names, "", m).map(|f| f.of_spp(spp)));
@@ -64,7 +64,7 @@ impl Tables<'_> {
     fn times(&self, s: &SettingResult, m: usize, all: &mut Vec<Figure>) {
         let method = self.plan.methods[m].name();
         let voxel_size = (m > 0).then_some(self.plan.voxel_size);
-        let about = self.about("time", s.setting.to_string(), method, voxel_size);
+        let about = self.about("time", s.integrator.to_string(), method, voxel_size);
         let f = self.method(s, m);
         all.extend(of_median(&about, ["T_build", "T_build low", "T_build high"], "s", f.t_build));
         for (&t_build, &seed) in self.measured.t_build[m].iter().zip(&self.plan.seeds) {
