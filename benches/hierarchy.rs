@@ -5,20 +5,20 @@
 use std::{hint::black_box, time::Duration};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use vdf::render::{
-    IntegratorKind,
+use vdf::{
     geometry::{Bvh, Segment},
+    render::Integrator,
 };
 
 #[allow(dead_code, reason = "each bench uses its part")]
 mod common;
-use common::Prepared;
+use common::Bench;
 
 fn bench(c: &mut Criterion) {
     for scene in ["cbox_vol2", "san-miguel"] {
-        let prepared = Prepared::new(scene, 128);
-        let bvh = &prepared.world.bvh;
-        let queries = prepared.record(IntegratorKind::Volpath, 30_000);
+        let bench = Bench::new(scene, 128);
+        let bvh = &bench.none.world().bvh;
+        let queries = bench.record(Integrator::Volpath, 30_000);
         let segments: Vec<_> = queries.iter().map(|q| Segment::new(q.from, q.to)).collect();
         for s in &segments {
             let mut nearest = f64::INFINITY;
@@ -44,7 +44,7 @@ fn bench(c: &mut Criterion) {
                 hits
             });
         });
-        let triangles = &prepared.world.triangles;
+        let triangles = &bench.none.world().triangles;
         group.throughput(Throughput::Elements(triangles.len() as u64)).sample_size(10);
         group.bench_function(BenchmarkId::new("build", scene), |b| b.iter(|| Bvh::new(black_box(triangles))));
         group.finish();

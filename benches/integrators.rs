@@ -3,44 +3,32 @@
 //! The images are compared before anything is timed.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use vdf::render::{self, BuildReport, FieldKind, IntegratorKind, Method, NeighbourhoodKind, RenderOptions};
+use vdf::{
+    render::{Integrator, Quiet, RenderOptions},
+    visibility::Method,
+};
 
 #[allow(dead_code, reason = "each bench uses its part")]
 mod common;
-use common::{Prepared, Quiet, RAYMARCH};
+use common::{Bench, RAYMARCH};
 
-const METHODS: [Method; 3] = [
-    Method::None,
-    Method::Field(FieldKind::Amr, NeighbourhoodKind::Safe),
-    Method::Field(FieldKind::Amr, NeighbourhoodKind::Extended),
-];
+const METHODS: [&str; 3] = ["none", "amr-sn", "amr-xsn"];
 
 const SIZE: u32 = 64;
 const SPP: u32 = 4;
 
 fn bench(c: &mut Criterion) {
     for scene in ["cbox_vol2", "cbox_vol4", "san-miguel"] {
-        let prepared = Prepared::new(scene, SIZE);
-        let emitters = prepared.scene.emitters.len();
-        let build = BuildReport { neighbourhoods: vec![None; emitters], ..BuildReport::default() };
-        for (name, integrator) in [("volpath", IntegratorKind::Volpath), ("raymarch", RAYMARCH)] {
-            let mut group = c.benchmark_group(format!("{name}/{scene}"));
+        let bench = Bench::new(scene, SIZE);
+        for integrator in [Integrator::Volpath, RAYMARCH] {
+            let mut group = c.benchmark_group(format!("{}/{scene}", integrator.name()));
             group.sample_size(10).throughput(Throughput::Elements(u64::from(SIZE * SIZE * SPP)));
             let mut expected = None;
             for method in METHODS {
-                let acceleration = prepared.acceleration(method);
+                let prepared = bench.with(method.parse::<Method>().expect("a method"));
                 let options =
-                    RenderOptions { method, integrator, spp: Some(SPP), threads: Some(1), ..RenderOptions::default() };
-                let ready = render::Prepared {
-                    world: &prepared.world,
-                    t_hierarchy: 0.0,
-                    acceleration: &acceleration,
-                    build: &build,
-                };
-                let image = || {
-                    let rendering = render::render_prepared(&prepared.scene, &ready, &options, &Quiet);
-                    rendering.expect("usable options").image.pixels
-                };
+                    RenderOptions { integrator, spp: Some(SPP), threads: Some(1), ..RenderOptions::default() };
+                let image = || prepared.render(&options, &Quiet).expect("usable options").image.pixels;
                 assert_eq!(expected.get_or_insert_with(image), &image(), "{method} changes the image");
                 group.bench_function(BenchmarkId::from_parameter(method), |b| b.iter(image));
             }

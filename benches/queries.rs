@@ -6,75 +6,59 @@
 use std::{hint::black_box, time::Duration};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use vdf::render::{
-    Answer, Counters, FieldKind, IntegratorKind, Method, NeighbourhoodKind, Proofs, ProofsVisitor, ShadowQuery,
-    Visibility, geometry::Segment,
+use vdf::{
+    geometry::Segment,
+    render::{Integrator, PreparedScene},
+    visibility::{Answer, Counters, FieldKind, Method, PointProver, ShadowQuery},
 };
 
 #[allow(dead_code, reason = "each bench uses its part")]
 mod common;
-use common::{Prepared, RAYMARCH};
+use common::{Bench, RAYMARCH};
 
-const STREAMS: [(&str, &str, IntegratorKind); 4] = [
-    ("cbox_vol2/volpath", "cbox_vol2", IntegratorKind::Volpath),
-    ("cbox_vol4/volpath", "cbox_vol4", IntegratorKind::Volpath),
+const STREAMS: [(&str, &str, Integrator); 4] = [
+    ("cbox_vol2/volpath", "cbox_vol2", Integrator::Volpath),
+    ("cbox_vol4/volpath", "cbox_vol4", Integrator::Volpath),
     ("cbox_vol4/raymarch", "cbox_vol4", RAYMARCH),
-    ("san-miguel/volpath", "san-miguel", IntegratorKind::Volpath),
+    ("san-miguel/volpath", "san-miguel", Integrator::Volpath),
 ];
 
 /// Of the neighbourhoods only those of `amr`: with any field they answer alike.
 fn measured(method: &Method) -> bool {
-    matches!(method, Method::None | Method::Field(_, NeighbourhoodKind::None) | Method::Field(FieldKind::Amr, _))
+    method.point_prover() == PointProver::Field || method.field() == Some(FieldKind::Amr)
 }
 
-struct Bench<'a> {
-    c: &'a mut Criterion,
-    stream: &'static str,
-    method: Method,
-    prepared: &'a Prepared,
-    queries: &'a [ShadowQuery],
-}
-
-impl ProofsVisitor for Bench<'_> {
-    type Output = ();
-
-    fn visit<P: Proofs>(self, proofs: &P) {
-        let bvh = &self.prepared.world.bvh;
-        let visibility = Visibility::new(bvh, proofs, false);
-        let mut counters = Counters::default();
-        for q in self.queries {
-            let expected = !bvh.occluded(&Segment::new(q.from, q.to));
-            assert_eq!(visibility.unoccluded(q, &mut counters), expected, "{} answers {q:?} wrongly", self.method);
-        }
-        let mut group = self.c.benchmark_group("query");
-        group.throughput(Throughput::Elements(self.queries.len() as u64));
-        group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(1));
-        group.bench_function(BenchmarkId::new(self.stream, self.method), |b| {
-            b.iter(|| {
-                let mut counters = Counters::default();
-                self.queries.iter().filter(|q| visibility.unoccluded(black_box(q), &mut counters)).count()
-            });
-        });
-        if self.method != Method::None {
-            group.bench_function(BenchmarkId::new(format!("{}/proof", self.stream), self.method), |b| {
-                let proved = |q: &&ShadowQuery| {
-                    let q = black_box(*q);
-                    proofs.answer(q.emitter, q.from, q.to) == Answer::Unoccluded
-                };
-                b.iter(|| self.queries.iter().filter(proved).count());
-            });
-        }
-        group.finish();
+fn measure(c: &mut Criterion, stream: &'static str, prepared: &PreparedScene, queries: &[ShadowQuery]) {
+    let (bvh, provers, method) = (&prepared.world().bvh, prepared.provers(), prepared.method());
+    let visibility = prepared.visibility();
+    let mut counters = Counters::default();
+    for q in queries {
+        let expected = !bvh.occluded(&Segment::new(q.from, q.to));
+        assert_eq!(visibility.unoccluded(q, &mut counters), expected, "{method} answers {q:?} wrongly");
     }
+    let mut group = c.benchmark_group("query");
+    group.throughput(Throughput::Elements(queries.len() as u64));
+    group.sample_size(20).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(1));
+    group.bench_function(BenchmarkId::new(stream, method), |b| {
+        b.iter(|| {
+            let mut counters = Counters::default();
+            queries.iter().filter(|q| visibility.unoccluded(black_box(q), &mut counters)).count()
+        });
+    });
+    if method != Method::NONE {
+        group.bench_function(BenchmarkId::new(format!("{stream}/proof"), method), |b| {
+            b.iter(|| queries.iter().filter(|q| provers.answer(black_box(q)) == Answer::Unoccluded).count());
+        });
+    }
+    group.finish();
 }
 
 fn bench(c: &mut Criterion) {
     for (stream, scene, integrator) in STREAMS {
-        let prepared = Prepared::new(scene, 128);
-        let queries = prepared.record_spatial(integrator, 30_000);
-        for method in Method::ALL.into_iter().filter(measured) {
-            let acceleration = prepared.acceleration(method);
-            acceleration.accept(Bench { c, stream, method, prepared: &prepared, queries: &queries });
+        let bench = Bench::new(scene, 128);
+        let queries = bench.record_spatial(integrator, 30_000);
+        for method in Method::all().filter(measured) {
+            measure(c, stream, &bench.with(method), &queries);
         }
     }
 }

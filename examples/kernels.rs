@@ -7,9 +7,10 @@
 use std::hint::black_box;
 
 use anyhow::{Context as _, anyhow, ensure};
-use vdf::render::{
-    Acceleration, Answer, IntegratorKind, Method, Proofs, ProofsVisitor, ShadowQuery,
+use vdf::{
     geometry::{Bvh, Segment},
+    render::Integrator,
+    visibility::{Answer, Method, Provers, ShadowQuery},
 };
 
 #[path = "../benches/common/mod.rs"]
@@ -20,8 +21,8 @@ const QUERIES: usize = 1000;
 
 /// Its name is in callgrind's command.
 #[inline(never)]
-fn kernel_proof<P: Proofs>(proofs: &P, queries: &[ShadowQuery]) -> usize {
-    queries.iter().filter(|q| proofs.answer(q.emitter, q.from, q.to) == Answer::Unoccluded).count()
+fn kernel_proof(provers: &Provers, queries: &[ShadowQuery]) -> usize {
+    queries.iter().filter(|q| provers.answer(q) == Answer::Unoccluded).count()
 }
 
 #[inline(never)]
@@ -34,33 +35,23 @@ fn kernel_first_hit(bvh: &Bvh, queries: &[ShadowQuery]) -> usize {
     queries.iter().filter(|q| bvh.intersect(&Segment::new(q.from, q.to)).is_some()).count()
 }
 
-struct Proved<'a>(&'a [ShadowQuery]);
-
-impl ProofsVisitor for Proved<'_> {
-    type Output = usize;
-
-    fn visit<P: Proofs>(self, proofs: &P) -> usize {
-        kernel_proof(black_box(proofs), self.0)
-    }
-}
-
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
     let (Some(scene), Some(kernel), None) = (arguments.next(), arguments.next(), arguments.next()) else {
         return Err(anyhow!("usage: kernels SCENE KERNEL"));
     };
-    let prepared = common::Prepared::new(&scene, 64);
-    let mut queries = prepared.record_spatial(IntegratorKind::Volpath, 20 * QUERIES as u64);
+    let bench = common::Bench::new(&scene, 64);
+    let mut queries = bench.record_spatial(Integrator::Volpath, 20 * QUERIES as u64);
     ensure!(queries.len() >= QUERIES, "only {} spatial queries", queries.len());
     queries.truncate(QUERIES);
-    let bvh = black_box(&prepared.world.bvh);
+    let bvh = black_box(&bench.none.world().bvh);
     let count = match kernel.as_str() {
         "any-hit" => kernel_any_hit(bvh, black_box(&queries)),
         "first-hit" => kernel_first_hit(bvh, black_box(&queries)),
         method => {
             let method: Method = method.parse().with_context(|| format!("no kernel {method}"))?;
-            let acceleration: Acceleration = prepared.acceleration(method);
-            acceleration.accept(Proved(black_box(&queries)))
+            let prepared = bench.with(method);
+            kernel_proof(black_box(prepared.provers()), black_box(&queries))
         }
     };
     println!("{scene} {kernel}: {count} of {QUERIES}");

@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{all_methods, builtin, options, rendered};
-use vdf::render::{
-    IntegratorKind, Method, RenderOptions, Rgb, TransmittanceEstimator,
-    scene::{PixelRect, Scene},
+use common::{Options, all_methods, builtin, options, rendered};
+use vdf::{
+    render::{Integrator, TransmittanceEstimator},
+    scene::{PixelRect, Rgb, Scene},
+    visibility::Method,
 };
 
 fn bits(pixels: &[Rgb]) -> Vec<[u32; 3]> {
@@ -14,13 +15,13 @@ fn bits(pixels: &[Rgb]) -> Vec<[u32; 3]> {
 
 /// Renders with all methods and compares with `none`; both numbers of threads meet coarse and fine voxels, as their product would only
 /// take longer. Returns how often anything was proved, and how many images were compared.
-fn all_alike(name: &str, scene: &Scene, base: &RenderOptions, voxel_sizes: &[f64]) -> (usize, usize) {
+fn all_alike(name: &str, scene: &Scene, base: &Options, voxel_sizes: &[f64]) -> (usize, usize) {
     let reference = rendered(scene, base);
     assert!(reference.image.pixels.iter().any(|p| p.max_element() > 0.0), "{name} is black");
     let (mut proving, mut images) = (0, 0);
     for method in all_methods() {
         for (&voxel_size, threads) in voxel_sizes.iter().zip([2, 1].into_iter().cycle()) {
-            let o = RenderOptions { method, voxel_size: Some(voxel_size), threads: Some(threads), ..base.clone() };
+            let o = Options { method, voxel_size: Some(voxel_size), threads: Some(threads), ..base.clone() };
             let r = rendered(scene, &o);
             proving += usize::from(r.statistics.proved + r.statistics.on_light_proved > 0);
             images += 1;
@@ -34,7 +35,7 @@ fn all_alike(name: &str, scene: &Scene, base: &RenderOptions, voxel_sizes: &[f64
     (proving, images)
 }
 
-const INTEGRATORS: [IntegratorKind; 2] = [IntegratorKind::Volpath, IntegratorKind::Raymarch { samples_per_segment: 5 }];
+const INTEGRATORS: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 5 }];
 
 #[test]
 fn images_do_not_depend_on_method_voxel_size_or_threads() {
@@ -42,7 +43,7 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
     for name in ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6"] {
         let scene = builtin(name, &size);
         for integrator in INTEGRATORS {
-            let base = RenderOptions { integrator, ..options() };
+            let base = Options { integrator, ..options() };
             let (proving, images) = all_alike(name, &scene, &base, &[4.0, 8.0, 16.0]);
             assert_eq!(proving, images, "{name}: nothing proved");
             all_alike(name, &scene, &base, &[100.0]);
@@ -55,7 +56,7 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
 fn images_of_analog_transmittance_do_not_depend_on_method() {
     let scene = builtin("cbox_vol4", &[("width", "24"), ("height", "20"), ("spp", "2")]);
     for integrator in INTEGRATORS {
-        let base = RenderOptions { integrator, transmittance: TransmittanceEstimator::Analog, ..options() };
+        let base = Options { integrator, transmittance: TransmittanceEstimator::Analog, ..options() };
         let (proving, images) = all_alike("analog", &scene, &base, &[8.0]);
         assert_eq!(proving, images, "nothing proved");
     }
@@ -66,10 +67,10 @@ fn images_of_analog_transmittance_do_not_depend_on_method() {
 fn images_do_not_depend_on_segment_first() {
     for name in ["cbox_vol2", "cbox_vol4"] {
         let scene = builtin(name, &[("width", "24"), ("height", "20"), ("spp", "4")]);
-        let reference = rendered(&scene, &RenderOptions { segment_first: false, ..options() });
-        for method in std::iter::once(Method::None).chain(all_methods()) {
+        let reference = rendered(&scene, &Options { segment_first: false, ..options() });
+        for method in std::iter::once(Method::NONE).chain(all_methods()) {
             for segment_first in [true, false] {
-                let o = RenderOptions { method, voxel_size: Some(8.0), segment_first, ..options() };
+                let o = Options { method, voxel_size: Some(8.0), segment_first, ..options() };
                 let r = rendered(&scene, &o);
                 assert!(bits(&r.image.pixels) == bits(&reference.image.pixels), "{name} {method} {segment_first}");
             }
@@ -82,7 +83,7 @@ fn generated_scenes_are_alike_with_all_methods() {
     for name in ["san-miguel", "scape"] {
         let scene = builtin(name, &[("width", "12"), ("height", "12"), ("spp", "1")]);
         for integrator in INTEGRATORS {
-            let (proving, images) = all_alike(name, &scene, &RenderOptions { integrator, ..options() }, &[0.5]);
+            let (proving, images) = all_alike(name, &scene, &Options { integrator, ..options() }, &[0.5]);
             assert_eq!(proving, images, "{name}: nothing proved");
         }
     }
@@ -92,8 +93,7 @@ fn generated_scenes_are_alike_with_all_methods() {
 fn an_area_light_is_alike_with_all_methods() {
     let scene = builtin("cbox_light", &[("width", "24"), ("height", "20"), ("spp", "4")]);
     for integrator in INTEGRATORS {
-        let (proving, images) =
-            all_alike("ceiling light", &scene, &RenderOptions { integrator, ..options() }, &[8.0, 16.0]);
+        let (proving, images) = all_alike("ceiling light", &scene, &Options { integrator, ..options() }, &[8.0, 16.0]);
         // All methods but the plain ones, which have no neighbourhoods.
         assert_eq!(proving * 3, images * 2);
     }
@@ -103,9 +103,9 @@ fn an_area_light_is_alike_with_all_methods() {
 #[test]
 fn segment_first_saves_rays_and_nothing_else() {
     let scene = builtin("cbox_vol4", &[("width", "24"), ("height", "20"), ("spp", "2")]);
-    let base = RenderOptions { method: Method::default(), voxel_size: Some(8.0), ..options() };
+    let base = Options { method: Method::default(), voxel_size: Some(8.0), ..options() };
     let first = rendered(&scene, &base);
-    let cast = rendered(&scene, &RenderOptions { segment_first: false, ..base });
+    let cast = rendered(&scene, &Options { segment_first: false, ..base });
     assert!(bits(&first.image.pixels) == bits(&cast.image.pixels));
     assert_eq!((cast.statistics.flights, cast.statistics.flights_proved), (0, 0));
     assert_eq!(first.statistics.rays + first.statistics.flights_proved, cast.statistics.rays);
@@ -121,7 +121,7 @@ fn a_crop_is_a_part_of_the_whole() {
         PixelRect { x0: 7, y0: 17, x1: 33, y1: 20 },
         PixelRect { x0: 39, y0: 35, x1: 40, y1: 36 },
     ] {
-        let part = rendered(&scene, &RenderOptions { crop: Some(crop), ..options() }).image;
+        let part = rendered(&scene, &Options { crop: Some(crop), ..options() }).image;
         let mut expected = Vec::new();
         for y in crop.y0..crop.y1 {
             for x in crop.x0..crop.x1 {
@@ -136,6 +136,6 @@ fn a_crop_is_a_part_of_the_whole() {
 fn the_seed_changes_the_noise() {
     let scene = builtin("cbox_vol2", &[("width", "8"), ("height", "8"), ("spp", "2")]);
     let a = rendered(&scene, &options()).image;
-    let b = rendered(&scene, &RenderOptions { seed: Some(99), ..options() }).image;
+    let b = rendered(&scene, &Options { seed: Some(99), ..options() }).image;
     assert_ne!(bits(&a.pixels), bits(&b.pixels));
 }

@@ -4,10 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use vdf_render::{
-    ImageFormat,
-    metrics::{Comparison, DynamicRange, PIXELS_PER_DEGREE, compare, hdr_flip, magma},
-    read_exr, read_image,
+use vdf::{
+    image::metrics::{Comparison, DynamicRange, PIXELS_PER_DEGREE, compare, hdr_flip, magma},
+    image::{ImageFormat, read_exr, read_image},
 };
 
 /// FLIP is computed in single precision here and there, with sums in another order. Near 0 both of its powers magnify rounding: a colour
@@ -61,7 +60,7 @@ fn check(name: &str) {
         assert!(worst <= PIXEL_TOLERANCE, "{worst}");
     };
     let (ldr, hdr): (Vec<f32>, Vec<f32>) = maps.pixels.iter().map(|p| (p.x, p.y)).unzip();
-    same_map(&vdf_render::metrics::ldr_flip(&image, &reference, PIXELS_PER_DEGREE).unwrap().values, &ldr);
+    same_map(&vdf::image::metrics::ldr_flip(&image, &reference, PIXELS_PER_DEGREE).unwrap().values, &ldr);
     assert_eq!(c.flip_hdr.is_some(), pair.get("flip_hdr").is_some());
     let (Some(flip), Some(flip_far)) = (c.flip_hdr, far.flip_hdr) else { return };
     close("flip-hdr", flip, &pair["flip_hdr"]["default"], MEAN_TOLERANCE);

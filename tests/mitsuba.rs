@@ -19,10 +19,12 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{builtin, options, rendered};
-use vdf::render::{
-    Image, Method, RenderOptions, TransmittanceEstimator, read_exr,
+use common::{Options, builtin, options, rendered};
+use vdf::{
+    image::{Image, read_exr},
+    render::TransmittanceEstimator,
     scene::{LoadOptions, Scene},
+    visibility::Method,
 };
 
 /// Blocks along each side of the film.
@@ -163,7 +165,7 @@ fn ours(name: &str, depth: i32, transmittance: TransmittanceEstimator) -> Blocks
     let mut width = 0;
     let renders: Vec<_> = (0..SEEDS)
         .map(|seed| {
-            let o = RenderOptions {
+            let o = Options {
                 method: Method::default(),
                 transmittance,
                 seed: Some(seed.into()),

@@ -7,10 +7,10 @@ mod common;
 use common::cuboid;
 use dashu_float::{FBig, round::mode::HalfEven};
 use glam::{DVec3, dvec3, vec3};
-use vdf::render::{
-    Flight, Media, Rgb, Sampler,
+use vdf::{
     geometry::{Bvh, Segment},
-    scene::{Boundary, Medium, MediumId, Phase},
+    render::{FreeFlight, Media, PhaseFunction as _, Sampler},
+    scene::{Boundary, Medium, MediumId, Phase, Rgb},
 };
 
 type Big = FBig<HalfEven, 2>;
@@ -129,7 +129,9 @@ fn sampled_distances() {
         let exact = -(big(1.0) - big(xi)).ln() / (big(sigma_t) * length(&s));
         let media = fog(sigma_t, &[]);
         let case = || format!("σ_t = {sigma_t}, ξ = {xi}, {s:?}");
-        let Flight::Collision { t, medium: FOG } = media.fly(&s, Some(FOG), tau) else { panic!("{}", case()) };
+        let FreeFlight::Collision { t, medium: FOG } = media.free_flight(&s, Some(FOG), tau) else {
+            panic!("{}", case())
+        };
         bound.check(error(t, &exact), 8.0, &case);
         let flight = media.short_flight(&s, FOG, tau).expect("nothing in the way");
         let way = length(&flight) / length(&s);

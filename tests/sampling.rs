@@ -13,10 +13,10 @@ use common::{
     statistics::{ALARM, assert_drawn_from, normal_tails},
 };
 use glam::{DVec3, Vec3, dvec3, vec3};
-use vdf::render::{
-    Flight, Lights, Media, Rgb, Sampler, Triangle,
-    geometry::Segment,
-    scene::{Bsdf, Emitter, Phase, ReconstructionFilter, Scene, Surface},
+use vdf::{
+    geometry::{Segment, Triangle},
+    render::{FreeFlight, Lights, Media, PhaseFunction as _, Sampler, sample_filter},
+    scene::{Bsdf, Emitter, Phase, ReconstructionFilter, Rgb, Scene, Surface},
 };
 
 /// The whole range of mean cosines, with both ends, zero and its surroundings.
@@ -144,12 +144,12 @@ fn free_flights_are_drawn_with_the_transmittance() {
         let mut counts = vec![0; CELLS + 1];
         for i in 0..200_000 {
             let tau = -(-Sampler::new(31, i, k as u32, 0).next_1d()).ln_1p();
-            let cell = match media.fly(&segment, None, tau) {
-                Flight::Collision { t, medium } => {
+            let cell = match media.free_flight(&segment, None, tau) {
+                FreeFlight::Collision { t, medium } => {
                     assert!(media.medium(medium).sigma_t > 0.0, "a collision in an empty medium");
                     ((t / last * CELLS as f64) as usize).min(CELLS - 1)
                 }
-                Flight::Passed(medium) => {
+                FreeFlight::Passed(medium) => {
                     assert_eq!(medium, None, "outside again");
                     CELLS
                 }
@@ -175,7 +175,7 @@ fn short_flights_are_flights() {
         let tau = -(-u.next_1d()).ln_1p();
         if let Some(flight) = media.short_flight(&segment, medium, tau) {
             found += 1;
-            let Flight::Collision { t, medium: there } = media.fly(&segment, Some(medium), tau) else {
+            let FreeFlight::Collision { t, medium: there } = media.free_flight(&segment, Some(medium), tau) else {
                 panic!("{segment:?}: no collision")
             };
             assert_eq!(there, medium);
@@ -360,7 +360,7 @@ fn filters_are_drawn_with_their_density() {
             cells.iter().flat_map(|y| cells.iter().map(move |x| x * y / total / total)).collect();
         let mut counts = vec![0; probabilities.len()];
         for i in 0..200_000 {
-            let [x, y] = filter.sample(&mut Sampler::new(51, i, 0, 0)).map(|x| (x - low) / width);
+            let [x, y] = sample_filter(&filter, &mut Sampler::new(51, i, 0, 0)).map(|x| (x - low) / width);
             assert!((0.0..=CELLS as f64).contains(&x) && (0.0..=CELLS as f64).contains(&y), "{filter:?}: outside");
             counts[(y as usize).min(CELLS - 1) * CELLS + (x as usize).min(CELLS - 1)] += 1;
         }
@@ -368,7 +368,7 @@ fn filters_are_drawn_with_their_density() {
         // By one coordinate, with more samples: what the tails lack is seen only so.
         let mut counts = vec![0; CELLS];
         for i in 0..1_000_000 {
-            for x in filter.sample(&mut Sampler::new(52, i, 0, 0)) {
+            for x in sample_filter(&filter, &mut Sampler::new(52, i, 0, 0)) {
                 counts[(((x - low) / width) as usize).min(CELLS - 1)] += 1;
             }
         }

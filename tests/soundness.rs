@@ -6,12 +6,13 @@
 
 mod common;
 
-use common::{Quiet, builtin, cuboid, empty_scene};
+use common::{builtin, cuboid, empty_scene};
 use glam::{DVec3, Vec3, dvec3, vec3};
-use vdf::render::{
-    Rgb, Triangle,
-    scene::{Bsdf, Emitter, Scene, Surface},
-    verify::{VerifyOptions, VerifyReport, verify},
+use vdf::{
+    geometry::Triangle,
+    lab::verify::{VerifyOptions, VerifyReport, verify},
+    render::Quiet,
+    scene::{Bsdf, Emitter, Rgb, Scene, Surface},
 };
 
 /// Runs all methods on a scene; none may be wrong. Voxels of the sizes `finer` are for the long run only: nearly all time would go into
@@ -20,7 +21,7 @@ fn sound(name: &str, scene: &Scene, voxel_sizes: &[f64], finer: &[f64]) -> Verif
     let long = std::env::var("VDF_SEGMENTS").ok().map(|n| n.parse().expect("VDF_SEGMENTS is a number"));
     let voxel_sizes = [voxel_sizes, if long.is_some() { finer } else { &[] }].concat();
     let options = VerifyOptions { voxel_sizes, segments: long.unwrap_or(100_000), ..VerifyOptions::default() };
-    let report = verify(scene, &options, &Quiet).expect("sound options");
+    let report = verify(scene.clone(), &options, &Quiet).expect("sound options");
     println!("{name}\n{report}\n");
     assert!(report.is_sound(), "{name}:\n{report}");
     report

@@ -4,65 +4,49 @@ use std::borrow::Cow;
 
 use vdf::{
     distfield::VoxelBox,
-    render::{
-        Acceleration, IntegratorKind, Method, Progress, QueryKind, RenderOptions, Sampler, ShadowQuery, World,
-        queries::record_queries,
-        scene::{EmbeddedFile, LoadOptions, Scene, SceneSource, builtin, generated},
-    },
+    lab::queries::record_queries,
+    render::{Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions, Sampler},
+    scene::{EmbeddedFile, LoadOptions, Scene, SceneSource},
+    scenes::{builtin, generated},
+    visibility::{Method, QueryKind, ShadowQuery},
     voxel::{Resolution, Voxel, VoxelSet},
 };
 
 /// As in the thesis.
-pub(crate) const RAYMARCH: IntegratorKind = IntegratorKind::Raymarch { samples_per_segment: 7 };
+pub(crate) const RAYMARCH: Integrator = Integrator::raymarch(7);
 
-const MAX_VOXELS: u64 = 1 << 29;
-
-/// Reports nothing.
-pub(crate) struct Quiet;
-
-impl Progress for Quiet {
-    fn phase(&self, _: &str) {}
-    fn work_total(&self, _: u64) {}
-    fn work_done(&self, _: u64) {}
-    fn cancelled(&self) -> bool {
-        false
-    }
-}
-
-/// A scene, what is prepared of it, and a voxel size.
-pub(crate) struct Prepared {
-    pub(crate) scene: Scene,
-    pub(crate) world: World,
+/// A scene without a method, and a voxel size for those that it gets.
+pub(crate) struct Bench {
+    pub(crate) none: PreparedScene,
     pub(crate) voxel_size: f64,
 }
 
-impl Prepared {
+impl Bench {
     /// A built-in scene with this width and height in pixels; `san-miguel` has 10⁵ triangles.
     pub(crate) fn new(name: &str, size: u32) -> Self {
         let (source, voxel_size) = if name == "san-miguel" { (court(), 0.25) } else { (builtin(name), 8.0) };
         let size = ["width", "height"].map(|n| (n.to_owned(), size.to_string())).to_vec();
         let source = source.expect("a built-in name");
-        let scene = Scene::from_source(&source, &LoadOptions { defines: size }).expect("built-in scenes load");
-        let world = World::new(&scene);
-        Self { scene, world, voxel_size }
+        let scene = Scene::from_source(&source, &LoadOptions { defines: size, ..LoadOptions::default() })
+            .expect("built-in scenes load");
+        let none = PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet);
+        Self { none: none.expect("nothing is built"), voxel_size }
     }
 
-    pub(crate) fn acceleration(&self, method: Method) -> Acceleration {
-        let lights = self.scene.light_shapes();
-        Acceleration::build(method, &self.world.triangles, self.world.bounds, &lights, self.voxel_size, MAX_VOXELS)
-            .expect("a sound grid")
-            .0
+    /// The scene with a method.
+    pub(crate) fn with(&self, method: Method) -> PreparedScene {
+        let options = PrepareOptions { voxel_size: Some(self.voxel_size), ..PrepareOptions::with_method(method) };
+        self.none.with_options(&options, &Quiet).expect("a sound grid")
     }
 
     /// The queries of about as many paths as ask `most`, in the order of the render.
-    pub(crate) fn record(&self, integrator: IntegratorKind, most: u64) -> Vec<ShadowQuery> {
+    pub(crate) fn record(&self, integrator: Integrator, most: u64) -> Vec<ShadowQuery> {
         let options = RenderOptions { integrator, spp: Some(1), ..RenderOptions::default() };
-        let stream = record_queries(&self.scene, &self.world, &options, most, &Quiet);
-        stream.expect("usable options").queries
+        record_queries(&self.none, &options, most, &Quiet).expect("usable options").queries
     }
 
     /// Those of them that proofs are about.
-    pub(crate) fn record_spatial(&self, integrator: IntegratorKind, most: u64) -> Vec<ShadowQuery> {
+    pub(crate) fn record_spatial(&self, integrator: Integrator, most: u64) -> Vec<ShadowQuery> {
         let mut queries = self.record(integrator, most);
         queries.retain(|q| q.kind == QueryKind::Spatial);
         queries

@@ -3,47 +3,65 @@
 
 pub mod statistics;
 
-use vdf::render::{
-    IntegratorKind, Method, Progress, RenderOptions, Rendering, Rgb, TransmittanceEstimator, Triangle, render,
-    scene::{
-        self, Boundary, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
-        ReconstructionFilter, Scene,
+use vdf::{
+    geometry::Triangle,
+    render::{
+        Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, TransmittanceEstimator,
     },
+    scene::{
+        Boundary, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
+        ReconstructionFilter, Rgb, Scene,
+    },
+    visibility::Method,
 };
 
 use glam::{DMat4, DVec3, Vec3, vec3};
 
-/// Reports nothing and never stops.
-pub struct Quiet;
-
-impl Progress for Quiet {
-    fn phase(&self, _: &str) {}
-    fn work_total(&self, _: u64) {}
-    fn work_done(&self, _: u64) {}
-    fn cancelled(&self) -> bool {
-        false
-    }
+/// How to prepare a scene and how to render it, for tests that are about both.
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub method: Method,
+    pub voxel_size: Option<f64>,
+    pub integrator: Integrator,
+    pub transmittance: TransmittanceEstimator,
+    pub spp: Option<u32>,
+    pub seed: Option<u64>,
+    pub threads: Option<usize>,
+    pub crop: Option<PixelRect>,
+    pub segment_first: bool,
 }
 
 /// `volpath` without acceleration; the tests change what they are about.
-pub fn options() -> RenderOptions {
-    RenderOptions {
-        method: Method::None,
+pub fn options() -> Options {
+    Options {
+        method: Method::NONE,
         voxel_size: None,
-        integrator: IntegratorKind::Volpath,
+        integrator: Integrator::Volpath,
         transmittance: TransmittanceEstimator::Analytic,
         spp: None,
         seed: None,
         threads: Some(2),
         crop: None,
         segment_first: true,
-        max_voxels: 1 << 30,
     }
 }
 
+/// Prepares and renders.
+pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
+    let prepare = PrepareOptions {
+        voxel_size: o.voxel_size,
+        max_voxels: 1 << 30,
+        threads: o.threads,
+        ..PrepareOptions::with_method(o.method)
+    };
+    let Options { integrator, transmittance, spp, seed, threads, crop, segment_first, .. } = *o;
+    let options = RenderOptions { integrator, transmittance, spp, seed, threads, crop, segment_first };
+    PreparedScene::new(scene.clone(), &prepare, &Quiet)?.render(&options, &Quiet)
+}
+
 /// Renders and requires that no sample was refused.
-pub fn rendered(scene: &Scene, options: &RenderOptions) -> Rendering {
-    let rendering = render(scene, options, &Quiet).expect("the scene is sound");
+pub fn rendered(scene: &Scene, options: &Options) -> Rendering {
+    let rendering = render(scene, options).expect("the scene is sound");
     assert_eq!(rendering.statistics.refused, 0, "non-finite or negative samples");
     rendering
 }
@@ -160,12 +178,12 @@ pub fn eye(scene: &Scene) -> DVec3 {
 
 /// A built-in scene with `-D` definitions.
 pub fn builtin(name: &str, defines: &[(&str, &str)]) -> Scene {
-    let source = scene::builtin(name).expect("a built-in name");
+    let source = vdf::scenes::builtin(name).expect("a built-in name");
     let defines = defines.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
-    Scene::from_source(&source, &scene::LoadOptions { defines }).expect("built-in scenes load")
+    Scene::from_source(&source, &LoadOptions { defines, ..LoadOptions::default() }).expect("built-in scenes load")
 }
 
 /// The methods that prove something.
 pub fn all_methods() -> Vec<Method> {
-    Method::ALL.into_iter().filter(|&m| m != Method::None).collect()
+    Method::proving().collect()
 }

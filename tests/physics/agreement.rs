@@ -2,14 +2,15 @@
 //! reflections through fog that only absorbs. No closed form, so the scene may be anything.
 
 use glam::{dvec3, vec3};
-use vdf::render::{
-    IntegratorKind, RenderOptions, Rgb, Triangle,
-    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Scene, Surface},
+use vdf::{
+    geometry::Triangle,
+    render::Integrator,
+    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Rgb, Scene, Surface},
 };
 
 use crate::{
     check::VOLPATH,
-    common::{cuboid, empty_scene, options, rendered},
+    common::{Options, cuboid, empty_scene, options, rendered},
     fog::{Fog, add_fogs},
 };
 
@@ -55,11 +56,11 @@ fn the_integrators_agree_where_their_models_do() {
     ] {
         let scene = Scene { integrator: settings, ..scene(reflectance, albedo, density) };
         let image = |integrator, spp, seed| {
-            let o = RenderOptions { integrator, spp: Some(spp), seed: Some(seed), ..options() };
+            let o = Options { integrator, spp: Some(spp), seed: Some(seed), ..options() };
             rendered(&scene, &o).image.pixels
         };
         let traced = image(VOLPATH, 512, 1);
-        let marched = image(IntegratorKind::Raymarch { samples_per_segment: 8 }, 96, 2);
+        let marched = image(Integrator::Raymarch { samples_per_segment: 8 }, 96, 2);
         let n = traced.len() as f64;
         let differences: Vec<f64> = traced.iter().zip(&marched).map(|(a, b)| f64::from(a.x - b.x)).collect();
         let mean = differences.iter().sum::<f64>() / n;

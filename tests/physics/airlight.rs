@@ -3,10 +3,7 @@
 //! The light on the ray's axis has no finite integral; it is approached.
 
 use glam::{DVec3, Vec3, dvec3, vec3};
-use vdf::render::{
-    Rgb,
-    scene::{Emitter, IntegratorSettings, Phase, Scene},
-};
+use vdf::scene::{Emitter, IntegratorSettings, Phase, Rgb, Scene};
 
 use crate::{
     check::{Check, INTEGRATORS, VOLPATH},

@@ -4,14 +4,17 @@
 //! 6·10⁻⁷ each, and 2·10⁻⁴ for all of the some 250 here together. Seeds are fixed, so a test that passes keeps passing.
 //! *Deterministic* ones allow what single precision must round.
 
-use vdf::render::{IntegratorKind, RenderOptions, Rgb, scene::Scene};
+use vdf::{
+    render::Integrator,
+    scene::{Rgb, Scene},
+};
 
-use crate::common::{mean_and_error, options, rendered};
+use crate::common::{Options, mean_and_error, options, rendered};
 
-pub(crate) const VOLPATH: IntegratorKind = IntegratorKind::Volpath;
+pub(crate) const VOLPATH: Integrator = Integrator::Volpath;
 /// So many strata that hardly any noise is left.
-pub(crate) const RAYMARCH: IntegratorKind = IntegratorKind::Raymarch { samples_per_segment: 64 };
-pub(crate) const INTEGRATORS: [IntegratorKind; 2] = [VOLPATH, RAYMARCH];
+pub(crate) const RAYMARCH: Integrator = Integrator::Raymarch { samples_per_segment: 64 };
+pub(crate) const INTEGRATORS: [Integrator; 2] = [VOLPATH, RAYMARCH];
 
 /// Roundings that all samples share, of 2⁻²⁴ each: the light's weight and intensity, the phase function or BSDF, the transmittance twice,
 /// their product, the pixel. Those that differ between samples average out.
@@ -20,7 +23,7 @@ const SHARED_ROUNDINGS: f64 = 7.0 / 16_777_216.0;
 /// The comparisons of one integrator with one closed form.
 pub(crate) struct Check {
     form: &'static str,
-    integrator: IntegratorKind,
+    integrator: Integrator,
     cases: u32,
     /// Largest |mean − expected|/expected, and the relative standard error of that case.
     worst: (f64, f64),
@@ -28,7 +31,7 @@ pub(crate) struct Check {
 }
 
 impl Check {
-    pub(crate) fn new(form: &'static str, integrator: IntegratorKind) -> Self {
+    pub(crate) fn new(form: &'static str, integrator: Integrator) -> Self {
         Self { form, integrator, cases: 0, worst: (0.0, 0.0), largest_deviation: 0.0 }
     }
 
@@ -36,20 +39,20 @@ impl Check {
         self.form
     }
 
-    pub(crate) fn is(&self, integrator: IntegratorKind) -> bool {
+    pub(crate) fn is(&self, integrator: Integrator) -> bool {
         self.integrator == integrator
     }
 
     fn name(&self) -> &'static str {
         match self.integrator {
-            IntegratorKind::Volpath => "volpath",
-            IntegratorKind::Raymarch { .. } => "raymarch",
+            Integrator::Volpath => "volpath",
+            Integrator::Raymarch { .. } => "raymarch",
         }
     }
 
     /// The scene's pixels, `spp` samples each.
     pub(crate) fn render(&self, scene: &Scene, spp: u32) -> Vec<Rgb> {
-        let o = RenderOptions { integrator: self.integrator, spp: Some(spp), ..options() };
+        let o = Options { integrator: self.integrator, spp: Some(spp), ..options() };
         rendered(scene, &o).image.pixels
     }
 

@@ -1,17 +1,18 @@
 //! The two estimators of transmittance towards emitters: what analog draws, that both have one mean, and that analytic is quieter.
 
 use glam::{dvec3, vec3};
-use vdf::render::{
-    IntegratorKind, RenderOptions, Rgb, TransmittanceEstimator, Triangle,
-    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Scene, Surface},
+use vdf::{
+    geometry::Triangle,
+    render::{Integrator, TransmittanceEstimator},
+    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Rgb, Scene, Surface},
 };
 
-use crate::common::{add_fog, add_medium, cuboid, empty_scene, options, rendered};
+use crate::common::{Options, add_fog, add_medium, cuboid, empty_scene, options, rendered};
 
-const INTEGRATORS: [IntegratorKind; 2] = [IntegratorKind::Volpath, IntegratorKind::Raymarch { samples_per_segment: 4 }];
+const INTEGRATORS: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 4 }];
 
-fn image(scene: &Scene, integrator: IntegratorKind, transmittance: TransmittanceEstimator, seed: u64) -> Vec<Rgb> {
-    let o = RenderOptions { integrator, transmittance, seed: Some(seed), ..options() };
+fn image(scene: &Scene, integrator: Integrator, transmittance: TransmittanceEstimator, seed: u64) -> Vec<Rgb> {
+    let o = Options { integrator, transmittance, seed: Some(seed), ..options() };
     rendered(scene, &o).image.pixels
 }
 

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, dvec3};
-use vdf::render::scene::{Phase, Scene};
+use vdf::scene::{Phase, Scene};
 
 use crate::common::{add_fog, add_medium, integrate};
 

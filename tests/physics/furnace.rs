@@ -1,9 +1,9 @@
 //! Balances of energy: what is neither absorbed nor lost comes back.
 
 use glam::{DMat4, dvec3, vec3};
-use vdf::render::{
-    Rgb, Triangle,
-    scene::{Bsdf, Emitter, IntegratorSettings, MediumId, Phase, Scene, Surface},
+use vdf::{
+    geometry::Triangle,
+    scene::{Bsdf, Emitter, IntegratorSettings, MediumId, Phase, Rgb, Scene, Surface},
 };
 
 use crate::{

@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3, vec3};
-use vdf::render::{
-    Rgb, Triangle,
-    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Scene, Surface},
+use vdf::{
+    geometry::Triangle,
+    scene::{Bsdf, Emitter, IntegratorSettings, Phase, Rgb, Scene, Surface},
 };
 
 use crate::{

@@ -1,10 +1,10 @@
 //! Transmittance through boxes of fog, exp(−Σσ_t d) [Houska2013, Sec. 2.1]: along rays, and along arbitrary segments, tangents above all.
 
 use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
-use vdf::render::{
-    Flight, Media, Rgb, Sampler,
+use vdf::{
     geometry::Segment,
-    scene::{Boundary, Emitter, MediumId, Phase, Scene},
+    render::{FreeFlight, Media, Sampler},
+    scene::{Boundary, Emitter, MediumId, Phase, Rgb, Scene},
 };
 
 use crate::{
@@ -92,10 +92,8 @@ fn of_segments_is_that_of_clipping_to_slabs() {
     for i in 0..60_000 {
         let mut random = Random(Sampler::new(5, i, 0, 0));
         let fogs = random.fogs();
-        let media: Vec<_> = fogs
-            .iter()
-            .map(|f| vdf::render::scene::Medium { sigma_t: f.sigma_t, albedo: Rgb::ZERO, phase: f.phase })
-            .collect();
+        let media: Vec<_> =
+            fogs.iter().map(|f| vdf::scene::Medium { sigma_t: f.sigma_t, albedo: Rgb::ZERO, phase: f.phase }).collect();
         let boundaries: Vec<_> = (0..)
             .zip(&fogs)
             .map(|(k, f)| Boundary { triangles: cuboid(f.min, f.max), interior: Some(MediumId(k)), exterior: None })
@@ -123,8 +121,8 @@ fn of_segments_is_that_of_clipping_to_slabs() {
             touched += u32::from(expected == 0.0 && fogs.iter().any(|f| f.clip(a, b).is_some()));
 
             let depth = random.0.next_1d() * 1.5 * expected;
-            match media.fly(&segment, start, depth) {
-                Flight::Collision { t, medium } => {
+            match media.free_flight(&segment, start, depth) {
+                FreeFlight::Collision { t, medium } => {
                     flights += 1;
                     let reached = optical_depth_to(&fogs, a, b, t);
                     assert!(
@@ -135,12 +133,12 @@ fn of_segments_is_that_of_clipping_to_slabs() {
                     let inside = segment.at(t).clamp(fog.min.as_dvec3(), fog.max.as_dvec3());
                     assert!(segment.at(t).distance(inside) <= tolerance, "{i}: {} is not in {medium:?}", segment.at(t));
                 }
-                Flight::Passed(_) => assert!(depth >= tau, "{i}: passed {depth} of {tau}, {segment:?}"),
+                FreeFlight::Passed(_) => assert!(depth >= tau, "{i}: passed {depth} of {tau}, {segment:?}"),
             }
             if let Some(medium) = start
                 && let Some(flight) = media.short_flight(&segment, medium, depth)
             {
-                let Flight::Collision { t, medium: there } = media.fly(&segment, start, depth) else {
+                let FreeFlight::Collision { t, medium: there } = media.free_flight(&segment, start, depth) else {
                     panic!("{i}: a short flight that passes, {segment:?}");
                 };
                 assert!(there == medium && segment.at(t).distance(flight.q) <= 1e-12, "{i}: {flight:?} but {t}");

@@ -1,14 +1,14 @@
 //! Media and phase functions at the ends of what numbers allow, and emitters beside them: hard cases 36 to 44.
 
 use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
-use vdf::render::{
-    Flight, IntegratorKind, Media, RenderOptions, Rgb, Sampler, Triangle,
-    geometry::Segment,
-    scene::{Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Scene, Surface},
+use vdf::{
+    geometry::{Segment, Triangle},
+    render::{FreeFlight, Integrator, Media, PhaseFunction as _, Sampler},
+    scene::{Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Rgb, Scene, Surface},
 };
 
 use crate::{
-    common::{add_fog, add_medium, cuboid, empty_scene, integrate, mean_and_error, options, rendered},
+    common::{Options, add_fog, add_medium, cuboid, empty_scene, integrate, mean_and_error, options, rendered},
     room::{BOTH, GREY, bits, room, same_for_all_methods, wall},
 };
 
@@ -58,10 +58,10 @@ fn case_37_and_42_airlight_from_odd_places() {
             scene.integrator = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
             let expected = airlight(&scene, (3.0, 7.0));
             for integrator in BOTH {
-                let pixels = rendered(&scene, &RenderOptions { integrator, ..options() }).image.pixels;
+                let pixels = rendered(&scene, &Options { integrator, ..options() }).image.pixels;
                 let (mean, error) = mean_and_error(&pixels);
                 // So thin a medium that `volpath` hardly ever collides tells nothing.
-                if sigma_t < 1e-6 && integrator == IntegratorKind::Volpath {
+                if sigma_t < 1e-6 && integrator == Integrator::Volpath {
                     continue;
                 }
                 assert!(
@@ -81,16 +81,24 @@ fn case_36_the_ends_of_the_unit_interval() {
     let inside = dvec3(4.0, 6.0, 4.0);
     let s = Segment::new(inside, inside + DVec3::X * 2.0);
     let depth = |xi: f64| -(-xi).ln_1p();
-    assert_eq!(media.fly(&s, Some(MediumId(0)), depth(0.0)), Flight::Collision { t: 0.0, medium: MediumId(0) });
-    assert_eq!(media.fly(&s, Some(MediumId(0)), depth(1.0_f64.next_down())), Flight::Passed(Some(MediumId(0))));
+    assert_eq!(
+        media.free_flight(&s, Some(MediumId(0)), depth(0.0)),
+        FreeFlight::Collision { t: 0.0, medium: MediumId(0) }
+    );
+    assert_eq!(
+        media.free_flight(&s, Some(MediumId(0)), depth(1.0_f64.next_down())),
+        FreeFlight::Passed(Some(MediumId(0)))
+    );
     assert!(depth(1.0_f64.next_down()) < 37.0);
     // No collision in a vacuum, not even at depth 0; the first one where the fog begins.
     let from_outside = Segment::new(dvec3(0.0, 4.0, 4.0), dvec3(4.0, 4.0, 4.0));
-    assert_eq!(media.fly(&from_outside, None, 0.0), Flight::Collision { t: 0.25, medium: MediumId(0) });
+    assert_eq!(media.free_flight(&from_outside, None, 0.0), FreeFlight::Collision { t: 0.25, medium: MediumId(0) });
     // A depth that is reached exactly at the end belongs to what comes behind.
     let tau = media.optical_depth(&s, Some(MediumId(0)));
-    assert_eq!(media.fly(&s, Some(MediumId(0)), tau), Flight::Passed(Some(MediumId(0))));
-    let Flight::Collision { t, .. } = media.fly(&s, Some(MediumId(0)), tau.next_down()) else { panic!("no collision") };
+    assert_eq!(media.free_flight(&s, Some(MediumId(0)), tau), FreeFlight::Passed(Some(MediumId(0))));
+    let FreeFlight::Collision { t, .. } = media.free_flight(&s, Some(MediumId(0)), tau.next_down()) else {
+        panic!("no collision")
+    };
     assert!(t <= 1.0);
 }
 
@@ -106,13 +114,13 @@ fn case_37_extinction_without_limits() {
         let mut scene = make(0.0, 0.5);
         scene.boundaries.clear();
         scene.sensor.medium = None;
-        rendered(&scene, &RenderOptions { integrator, ..options() }).image.pixels
+        rendered(&scene, &Options { integrator, ..options() }).image.pixels
     });
     for sigma_t in [0.0, 5e-324, 1e-300, 1e-30, 1e-20] {
         for (integrator, vacuum) in BOTH.into_iter().zip(&vacuum) {
-            let fog = rendered(&make(sigma_t, 0.5), &RenderOptions { integrator, ..options() }).image.pixels;
+            let fog = rendered(&make(sigma_t, 0.5), &Options { integrator, ..options() }).image.pixels;
             // `raymarch` draws numbers for fog of any thinness, so that only the first surface can be compared there.
-            if integrator == IntegratorKind::Volpath || sigma_t == 0.0 {
+            if integrator == Integrator::Volpath || sigma_t == 0.0 {
                 assert!(bits(&fog) == bits(vacuum), "σ_t = {sigma_t}");
             }
         }
@@ -150,9 +158,9 @@ fn case_38_boundaries_that_change_nothing() {
         assert!((cut.optical_depth(&s, None) - tau).abs() < 1e-13 * tau);
         assert!((gap.optical_depth(&s, None) - tau * 7.0 / 8.0).abs() < 1e-13 * tau);
         let wanted = tau * u.next_1d();
-        let at = |media: &Media| match media.fly(&s, None, wanted) {
-            Flight::Collision { t, medium } => Some((t, medium)),
-            Flight::Passed(_) => None,
+        let at = |media: &Media| match media.free_flight(&s, None, wanted) {
+            FreeFlight::Collision { t, medium } => Some((t, medium)),
+            FreeFlight::Passed(_) => None,
         };
         let (a, b) = (at(&whole).expect("reached"), at(&cut).expect("reached"));
         assert!((a.0 - b.0).abs() < 1e-13, "{a:?} {b:?}");
@@ -174,7 +182,7 @@ fn case_39_collisions_stay_in_their_medium() {
         let tau = media.optical_depth(&s, start);
         // The last depths before the end of the fog, or any.
         let wanted = if i % 2 == 0 { tau.next_down() } else { tau * u.next_1d() };
-        if let Flight::Collision { t, .. } = media.fly(&s, start, wanted) {
+        if let FreeFlight::Collision { t, .. } = media.free_flight(&s, start, wanted) {
             let p = s.at(t);
             let off = (DVec3::splat(1.0) - p).max(p - DVec3::splat(7.0)).max_element();
             assert!((0.0..=1.0).contains(&t) && off < 1e-12, "{s:?}: {t}, outside by {off}");
@@ -196,7 +204,7 @@ fn case_40_channels_that_are_zero() {
         scene
     };
     for integrator in BOTH {
-        let o = RenderOptions { integrator, ..options() };
+        let o = Options { integrator, ..options() };
         for first in 0..3 {
             let colours: [Rgb; 3] = std::array::from_fn(|i| colours[(i + first) % 3]);
             let coloured = rendered(&make(colours), &o).image.pixels;
@@ -255,7 +263,7 @@ fn case_43_intervals_without_length() {
         let media = Media::new(&[medium(1.0)], &[slab]);
         let tau = media.optical_depth(&s, None);
         assert!(tau <= 1.1e-8, "a slab of {thickness} has the optical depth {tau}");
-        assert_eq!(media.fly(&s, None, 1.0), Flight::Passed(None), "a slab of {thickness}");
+        assert_eq!(media.free_flight(&s, None, 1.0), FreeFlight::Passed(None), "a slab of {thickness}");
     }
     let unit = closed(Vec3::ZERO, Vec3::ONE);
     let media = Media::new(&[medium(1.0)], std::slice::from_ref(&unit));
@@ -278,7 +286,7 @@ fn case_43_intervals_without_length() {
         let point = Segment::new(p, p);
         assert_eq!(media.optical_depth(&point, Some(MediumId(0))), 0.0);
         assert_eq!(media.transmittance(&point, Some(MediumId(0))), 1.0);
-        assert_eq!(media.fly(&point, Some(MediumId(0)), 0.0), Flight::Passed(Some(MediumId(0))));
+        assert_eq!(media.free_flight(&point, Some(MediumId(0)), 0.0), FreeFlight::Passed(Some(MediumId(0))));
         assert!(media.short_flight(&point, MediumId(0), 1.0).is_none());
     }
     // Each face twice, and once more the other way round: entered and left at one place is not entered.
@@ -344,11 +352,7 @@ fn a_hundred_thousand_bounces() {
     scene.media[0].sigma_t = 1e5;
     let rendering = rendered(
         &scene,
-        &RenderOptions {
-            spp: Some(1),
-            crop: Some(vdf::render::scene::PixelRect { x0: 0, y0: 0, x1: 2, y1: 2 }),
-            ..options()
-        },
+        &Options { spp: Some(1), crop: Some(vdf::scene::PixelRect { x0: 0, y0: 0, x1: 2, y1: 2 }), ..options() },
     );
     assert_eq!(rendering.statistics.queries, 4 * 99_999);
 }

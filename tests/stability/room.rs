@@ -1,15 +1,16 @@
 //! The room that most of these tests are set in, and what is compared of its pictures.
 
 use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
-use vdf::render::{
-    IntegratorKind, Method, RenderOptions, Rgb, Triangle,
-    scene::{Bsdf, Emitter, Phase, Scene, Surface},
+use vdf::{
+    geometry::Triangle,
+    render::Integrator,
+    scene::{Bsdf, Emitter, Phase, Rgb, Scene, Surface},
+    visibility::Method,
 };
 
-use crate::common::{add_fog, add_medium, cuboid, empty_scene, options, rendered};
+use crate::common::{Options, add_fog, add_medium, cuboid, empty_scene, options, rendered};
 
-pub(crate) const BOTH: [IntegratorKind; 2] =
-    [IntegratorKind::Volpath, IntegratorKind::Raymarch { samples_per_segment: 4 }];
+pub(crate) const BOTH: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 4 }];
 
 pub(crate) const GREY: Bsdf = Bsdf { front: Rgb::splat(0.6), back: Rgb::splat(0.4) };
 
@@ -40,10 +41,10 @@ pub(crate) fn room(lights: &[DVec3]) -> Scene {
 pub(crate) fn same_for_all_methods(name: &str, scene: &Scene, voxel_size: f64) -> [Vec<Rgb>; 2] {
     BOTH.map(|integrator| {
         let render = |method| {
-            let o = RenderOptions { method, integrator, voxel_size: Some(voxel_size), ..options() };
+            let o = Options { method, integrator, voxel_size: Some(voxel_size), ..options() };
             rendered(scene, &o).image.pixels
         };
-        let reference = render(Method::None);
+        let reference = render(Method::NONE);
         for method in ["amr-sn", "dsz", "dual-xsn"] {
             let method = method.parse().expect("a method");
             assert!(bits(&render(method)) == bits(&reference), "{name}, {integrator:?}, {method}");

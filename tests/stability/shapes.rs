@@ -1,10 +1,10 @@
 //! Triangles that try to be missed, hit twice or to face nowhere.
 
 use glam::{DMat4, DVec3, dvec3, vec3};
-use vdf::render::{
-    Rgb, Sampler, Triangle, World,
-    geometry::{Bvh, Segment, intersect_exact},
-    scene::{Bsdf, Emitter, Surface},
+use vdf::{
+    geometry::{Bvh, Segment, Triangle, intersect_exact},
+    render::{Sampler, World},
+    scene::{Bsdf, Emitter, Rgb, Surface},
 };
 
 use crate::{

@@ -1,13 +1,14 @@
 //! Other units, other places, and places for lights where they should not be.
 
 use glam::{DMat4, DVec3, dvec3};
-use vdf::render::{
-    RenderError, RenderOptions, Rgb, render,
-    scene::{Emitter, Scene},
+use vdf::{
+    render::RenderError,
+    scene::{Emitter, Rgb, Scene},
+    visibility::VisibilityError,
 };
 
 use crate::{
-    common::{self, builtin, empty_scene, mean_and_error, options, rendered},
+    common::{self, Options, builtin, empty_scene, mean_and_error, options, rendered},
     room::{BOTH, GREY, bits, room, same_for_all_methods, wall},
 };
 
@@ -43,7 +44,7 @@ fn powers_of_two_as_units_change_no_bit() {
         for integrator in BOTH {
             let render = |scale: f64, method: &str| {
                 let method = method.parse().expect("a method");
-                let o = RenderOptions { method, integrator, voxel_size: Some(voxel_size * scale), ..options() };
+                let o = Options { method, integrator, voxel_size: Some(voxel_size * scale), ..options() };
                 bits(&rendered(&moved(&scene, scale, DVec3::ZERO), &o).image.pixels)
             };
             let reference = render(1.0, "none");
@@ -61,7 +62,7 @@ fn powers_of_two_as_units_change_no_bit() {
 fn mean_over_seeds(scene: &Scene, first_seed: u64) -> (f64, f64) {
     let means: Vec<_> = (first_seed..first_seed + 24)
         .map(|seed| {
-            let pixels = rendered(scene, &RenderOptions { seed: Some(seed), ..options() }).image.pixels;
+            let pixels = rendered(scene, &Options { seed: Some(seed), ..options() }).image.pixels;
             Rgb::splat((pixels.iter().map(|p| f64::from(p.element_sum())).sum::<f64>() / pixels.len() as f64) as f32)
         })
         .collect();
@@ -90,7 +91,7 @@ fn units_and_places_do_not_change_the_picture() {
         let z = (mean - here.0) / here.1.hypot(error);
         assert!(z.abs() < 5.0, "×{scale} + {shift}: {mean} ± {error}, here {here:?}");
         for integrator in BOTH {
-            let o = RenderOptions { integrator, spp: Some(16), ..options() };
+            let o = Options { integrator, spp: Some(16), ..options() };
             let (a, b) = (rendered(&scene, &o).image.pixels, rendered(&there, &o).image.pixels);
             let off = whole(&b) / whole(&a) - 1.0;
             assert!(off.abs() < 1e-3, "×{scale} + {shift}, {integrator:?}: off by {off}");
@@ -103,8 +104,10 @@ fn units_and_places_do_not_change_the_picture() {
 #[test]
 fn exhausted_precision_is_an_error() {
     let there = moved(&room(&[dvec3(2.0, 6.0, 3.0)]), 64.0, DVec3::splat(1e7));
-    let o = RenderOptions { method: "amr-sn".parse().expect("a method"), voxel_size: Some(1.0), ..options() };
-    let Err(RenderError::Voxel(error)) = render(&there, &o, &common::Quiet) else { panic!("no error") };
+    let o = Options { method: "amr-sn".parse().expect("a method"), voxel_size: Some(1.0), ..options() };
+    let Err(RenderError::Visibility(VisibilityError::Voxel(error))) = common::render(&there, &o) else {
+        panic!("no error")
+    };
     assert!(error.to_string().contains('4'), "{error}");
 }
 

@@ -1,17 +1,15 @@
 //! The command line as typed.
 
-mod convergence;
-mod report;
-
 use std::{path::PathBuf, str::FromStr};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use vdf_render::{Method, UnknownMethod, metrics::PIXELS_PER_DEGREE, scene::PixelRect};
-
-pub(crate) use convergence::ReportConvergenceArgs;
-pub(crate) use report::{
-    ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportScalingArgs, ReportThesisArgs,
+use clap::{
+    Args, Parser, Subcommand, ValueEnum,
+    builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
+use vdf_image::metrics::PIXELS_PER_DEGREE;
+use vdf_render::Integrator;
+use vdf_scene::PixelRect;
+use vdf_visibility::{Method, UnknownMethod};
 
 /// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.
 #[derive(Debug, Parser)]
@@ -28,7 +26,6 @@ pub(crate) enum Command {
     Verify(VerifyArgs),
     Voxelize(VoxelizeArgs),
     Compare(CompareArgs),
-    Report(ReportArgs),
 }
 
 /// Render a scene to an EXR and a PNG.
@@ -47,17 +44,16 @@ pub(crate) struct RenderArgs {
     /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
-    /// Acceleration of visibility queries: none, or a field ndf, amr, dsz or dual, each alone or with -sn or -xsn;
-    /// the image is the same with all [default: amr-xsn, or none in a scene without point and area lights and without
-    /// --segment-first]
-    #[arg(long, value_name = "METHOD")]
+    /// Acceleration of visibility queries; the image is the same with all [default: amr-xsn, or none in a scene without
+    /// point and area lights and without --segment-first]
+    #[arg(long, value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Option<Method>,
     /// Side of a voxel in world units [default: a 128th of the scene's longest side]
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
-    /// Path tracing of all scattering, or ray marching of single scattering
-    #[arg(long, value_enum, default_value_t = IntegratorName::Volpath)]
-    pub(crate) integrator: IntegratorName,
+    /// How light is followed
+    #[arg(long, value_name = "INTEGRATOR", default_value = "volpath", value_parser = integrator_parser())]
+    pub(crate) integrator: Integrator,
     /// Samples on each path segment, for raymarch only [default: 7]
     #[arg(long, value_name = "N")]
     pub(crate) samples_per_segment: Option<u32>,
@@ -95,12 +91,6 @@ pub(crate) struct RenderArgs {
     /// No progress and no statistics in words; errors and warnings only
     #[arg(short, long)]
     pub(crate) quiet: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum IntegratorName {
-    Volpath,
-    Raymarch,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -214,7 +204,7 @@ pub(crate) struct VoxelizeArgs {
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
     /// Method that proves which voxels see a light
-    #[arg(long, default_value_t, value_name = "METHOD")]
+    #[arg(long, default_value_t, value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Method,
     /// Folder to write the voxels to; made if it does not exist
     #[arg(long, value_name = "DIR")]
@@ -264,6 +254,17 @@ pub(crate) struct CompareArgs {
     /// Print the figures as JSON; what is infinite or not defined is null
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Methods by name; the help lists them all.
+fn method_parser() -> impl TypedValueParser<Value = Method> {
+    PossibleValuesParser::new(Method::all().map(Method::name)).try_map(|name| name.parse::<Method>())
+}
+
+/// Integrators by name; the help lists them all.
+pub(crate) fn integrator_parser() -> impl TypedValueParser<Value = Integrator> {
+    let names = Integrator::NAMES.map(|(name, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<Integrator>())
 }
 
 fn parse_limit(text: &str) -> Result<f64, String> {

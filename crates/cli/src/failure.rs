@@ -6,7 +6,13 @@ use std::{
     process::ExitCode,
 };
 
+use anyhow::anyhow;
+use vdf_image::ImageError;
+use vdf_lab::LabError;
 use vdf_render::RenderError;
+use vdf_scene::SceneError;
+use vdf_scenes::ScenesError;
+use vdf_visibility::VisibilityError;
 
 /// Why the program ends without success.
 #[derive(Debug)]
@@ -61,12 +67,61 @@ impl From<RenderError> for Failure {
     fn from(e: RenderError) -> Self {
         match e {
             RenderError::Cancelled => Self::Interrupted,
-            RenderError::Threads { .. }
-            | RenderError::Image(_)
-            | RenderError::Field(_)
-            | RenderError::WrongAnswer(_)
-            | RenderError::UnstableAnswers { .. } => Self::Work(e.into()),
+            // The library knows no flags.
+            RenderError::Option { .. } => Self::Usage(anyhow!("--{e}")),
+            RenderError::Visibility(e) => e.into(),
+            _ => Self::Work(e.into()),
+        }
+    }
+}
+
+impl From<VisibilityError> for Failure {
+    fn from(e: VisibilityError) -> Self {
+        match e {
+            VisibilityError::Voxel(_) => Self::Usage(e.into()),
+            _ => Self::Work(e.into()),
+        }
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(e: SceneError) -> Self {
+        match &e {
+            SceneError::Define { name, .. } => {
+                let message = e.to_string().replacen(&format!("parameter {name}"), &format!("-D {name}"), 1);
+                Self::Usage(anyhow!(message))
+            }
             _ => Self::Usage(e.into()),
+        }
+    }
+}
+
+impl From<ScenesError> for Failure {
+    fn from(e: ScenesError) -> Self {
+        Self::Usage(anyhow!("--{e}"))
+    }
+}
+
+impl From<ImageError> for Failure {
+    fn from(e: ImageError) -> Self {
+        match e {
+            ImageError::SizeMismatch { .. } | ImageError::Uncomparable { .. } | ImageError::PixelsPerDegree { .. } => {
+                Self::Usage(e.into())
+            }
+            _ => Self::Work(e.into()),
+        }
+    }
+}
+
+impl From<LabError> for Failure {
+    fn from(e: LabError) -> Self {
+        match e {
+            LabError::Render(e) => e.into(),
+            LabError::Scene(e) => e.into(),
+            LabError::Visibility(e) => e.into(),
+            LabError::Image(e) => e.into(),
+            LabError::Queries { .. } | LabError::NoQueries { .. } => Self::Usage(e.into()),
+            _ => Self::Work(e.into()),
         }
     }
 }

@@ -55,11 +55,7 @@ pub(crate) fn render(job: &Job<'_>, progress: &dyn Progress) -> Result<Rendering
     Ok(Rendering { image, statistics })
 }
 
-fn render_tile(
-    job: &Job<'_>,
-    tile: PixelRect,
-    progress: &dyn Progress,
-) -> Result<(Vec<Rgb>, Counters), RenderError> {
+fn render_tile(job: &Job<'_>, tile: PixelRect, progress: &dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
     let tracer = job.tracer();
     let mut counters = Counters::default();
     let pixels = (tile.y0..tile.y1)

@@ -117,11 +117,7 @@ impl Statistics {
             voxel_size: build.resolution.map(|_| build.voxel_size),
             grid: build.resolution,
             free_share: ratio(free as u64, build.voxels as u64),
-            build: build
-                .parts
-                .iter()
-                .map(|p| PartSize { name: p.name, bytes: p.bytes, seconds: p.seconds })
-                .collect(),
+            build: build.parts.iter().map(|p| PartSize { name: p.name, bytes: p.bytes, seconds: p.seconds }).collect(),
             t_hierarchy: prepared.t_hierarchy(),
             t_build: build.seconds(),
             t_render,

@@ -115,8 +115,7 @@ fn bounds(scene: &Scene, triangles: &[Triangle]) -> Bounds {
         .emitters
         .iter()
         .filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
-    let bounds =
-        Bounds::of_points(triangles.iter().chain(boundaries).flat_map(Triangle::vertices_f64).chain(lights));
+    let bounds = Bounds::of_points(triangles.iter().chain(boundaries).flat_map(Triangle::vertices_f64).chain(lights));
     if bounds.is_empty() { Bounds::of_points([scene.sensor.world_from_camera.w_axis.truncate()]) } else { bounds }
 }
 

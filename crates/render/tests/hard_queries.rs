@@ -39,7 +39,8 @@ impl Fixture {
             let options = ProverOptions { method, voxel_size, max_voxels: 1 << 24 };
             Provers::build(&options, &triangles, Bounds::new(min, max), &shapes).expect("a sound grid").0
         };
-        let provers = sizes.iter().flat_map(|&s| Method::all().map(move |m| (m, s))).map(|(m, s)| build(m, s)).collect();
+        let provers =
+            sizes.iter().flat_map(|&s| Method::all().map(move |m| (m, s))).map(|(m, s)| build(m, s)).collect();
         Self { bvh: Bvh::new(&triangles), triangles, lights: lights.to_vec(), provers }
     }
 

@@ -3,8 +3,8 @@
 use std::{io::Write as _, path::Path};
 
 use anyhow::{Context as _, anyhow};
-use vdf_render::{
-    Image, ImageFormat, RenderError, check_writable,
+use vdf_image::{
+    Image, ImageError, ImageFormat, check_writable,
     metrics::{Comparison, DynamicRange, compare, write_error_map},
     read_image,
 };
@@ -18,14 +18,17 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
     let (a, b, range) = read(args)?;
     let comparison = compare(&a, &b, range, args.ppd).map_err(|e| match e {
         // The library knows no names of files.
-        RenderError::Uncomparable { image, reason } => {
+        ImageError::Uncomparable { image, reason } => {
             let path = if image == "image" { &args.a } else { &args.b };
             Failure::Usage(anyhow!("cannot compare: {} {reason}", path.display()))
+        }
+        ImageError::PixelsPerDegree { value } => {
+            Failure::Usage(anyhow!("--ppd must be from 1 to 1000 pixels, not {value}"))
         }
         e => e.into(),
     })?;
     if let Some(map) = &args.map {
-        write_error_map(map, &comparison.map).map_err(RenderError::from)?;
+        write_error_map(map, &comparison.map)?;
     }
     let stdout = &mut std::io::stdout();
     if args.json {
@@ -54,8 +57,8 @@ fn check_map(map: &Path, args: &CompareArgs) -> Result<(), Failure> {
 }
 
 fn read(args: &CompareArgs) -> Result<(Image, Image, DynamicRange), Failure> {
-    let (a, a_format) = read_image(&args.a).map_err(RenderError::from)?;
-    let (b, b_format) = read_image(&args.b).map_err(RenderError::from)?;
+    let (a, a_format) = read_image(&args.a)?;
+    let (b, b_format) = read_image(&args.b)?;
     let range = match (a_format, b_format) {
         (ImageFormat::Exr, ImageFormat::Exr) => DynamicRange::High,
         (ImageFormat::Png, ImageFormat::Png) => DynamicRange::Low,

@@ -7,27 +7,32 @@ use std::{
 
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
+use vdf_image::{AttributeValue, StagedFile, check_writable, stage_exr, stage_png};
+use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    AttributeValue, IntegratorKind, Method, RenderError, RenderOptions, Rendering, StagedFile, Statistics,
-    TransmittanceEstimator, World, check_writable,
-    queries::{QueryStream, record_queries},
-    render,
-    scene::{DEFAULT_SCENE, LoadOptions, Scene, builtin, builtin_names},
-    stage_exr, stage_png,
+    Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Statistics, TransmittanceEstimator,
 };
+use vdf_scene::{LoadOptions, Scene};
+use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
+use vdf_visibility::Method;
 
 use crate::{
-    args::{IntegratorName, RenderArgs, TransmittanceName},
+    args::{RenderArgs, TransmittanceName},
     failure::{Failure, say},
     progress::Reporter,
 };
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let mut options = options(args)?;
+    let options = options(args)?;
+    let prepare = PrepareOptions {
+        // Proofs of flights need a method, whatever the lights.
+        method: args.method.or_else(|| args.segment_first.then(Method::default)),
+        voxel_size: args.voxel,
+        threads: args.threads,
+        ..PrepareOptions::default()
+    };
+    prepare.validate()?;
     let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
-    // Who asks for proofs of flights wants a method, whatever the lights.
-    let default = || if args.segment_first { Method::default() } else { Method::for_lights(&scene.light_shapes()) };
-    options.method = args.method.unwrap_or_else(default);
     options.validate(&scene)?;
     let output = output(args, &name)?;
     for warning in &scene.warnings {
@@ -35,11 +40,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     }
 
     let reporter = Reporter::new(args.quiet)?;
-    let rendering = render(&scene, &options, &reporter);
+    let prepared = PreparedScene::new(scene, &prepare, &reporter)?;
+    let rendering = prepared.render(&options, &reporter);
     let stream = match (&rendering, &args.record_queries) {
-        (Ok(_), Some(_)) => {
-            Some(record_queries(&scene, &World::new(&scene), &options, args.max_queries, &reporter)).transpose()
-        }
+        (Ok(_), Some(_)) => Some(record_queries(&prepared, &options, args.max_queries, &reporter)).transpose(),
         _ => Ok(None),
     };
     reporter.finish();
@@ -52,7 +56,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
         write_stream(path, stream)?;
     }
-    let attributes = attributes(&rendering.statistics, &name, &scene);
+    let attributes = attributes(&rendering.statistics, &name, prepared.scene());
     write_all(&rendering, &output, args, &attributes)?;
     let stdout = &mut std::io::stdout();
     if !args.quiet {
@@ -77,15 +81,12 @@ pub(super) fn write_stream(path: &Path, stream: &QueryStream) -> Result<(), Fail
     stream.write(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)
 }
 
-/// The integrator that two options name together.
-pub(super) fn integrator(name: IntegratorName, samples_per_segment: Option<u32>) -> Result<IntegratorKind, Failure> {
-    Ok(match (name, samples_per_segment) {
-        (IntegratorName::Volpath, None) => IntegratorKind::Volpath,
-        (IntegratorName::Volpath, Some(_)) => {
-            return Err(Failure::Usage(anyhow!("--samples-per-segment goes with --integrator raymarch only")));
-        }
-        (IntegratorName::Raymarch, n) => IntegratorKind::Raymarch { samples_per_segment: n.unwrap_or(7) },
-    })
+/// The integrator with its samples per segment, if it takes any.
+pub(super) fn integrator(integrator: Integrator, samples_per_segment: Option<u32>) -> Result<Integrator, Failure> {
+    let Some(n) = samples_per_segment else { return Ok(integrator) };
+    integrator
+        .with_samples_per_segment(n)
+        .ok_or_else(|| Failure::Usage(anyhow!("--samples-per-segment goes with --integrator raymarch only")))
 }
 
 fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
@@ -93,7 +94,6 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         return Err(Failure::Usage(anyhow!("--max-queries must be at least 1")));
     }
     Ok(RenderOptions {
-        voxel_size: args.voxel,
         integrator: integrator(args.integrator, args.samples_per_segment)?,
         transmittance: match args.transmittance {
             TransmittanceName::Analytic => TransmittanceEstimator::Analytic,
@@ -104,24 +104,20 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         threads: args.threads,
         crop: args.crop,
         segment_first: args.segment_first,
-        ..RenderOptions::default()
     })
 }
 
-/// The scene and its name: a file if there is one of that path, else a built-in scene.
+/// The scene and its name: a file if there is one of that path, else a built-in scene. A folder is no scene, so it hides none.
 pub(super) fn load(scene: Option<&Path>, defines: &[(String, String)]) -> Result<(String, Scene), Failure> {
     let options = LoadOptions { defines: defines.to_vec() };
     let path = scene.unwrap_or(Path::new(DEFAULT_SCENE));
-    let known = path.to_str().and_then(builtin);
-    if let Some(source) = known.filter(|_| scene.is_none() || !path.exists()) {
-        return Ok((path.display().to_string(), Scene::from_source(&source, &options)?));
-    }
-    if !path.exists() {
-        let names = builtin_names().join(", ");
-        let path = path.display();
-        return Err(Failure::Usage(anyhow!(
-            "{path}: no such file, nor a built-in scene; the built-in scenes are {names}"
-        )));
+    if scene.is_none() || !path.exists() || path.is_dir() {
+        if let Some(source) = path.to_str().and_then(builtin) {
+            return Ok((path.display().to_string(), Scene::from_source(&source, &options)?));
+        }
+        let what = if path.is_dir() { "a folder; name the scene file in it" } else { "no such file" };
+        let (path, names) = (path.display(), builtin_names().join(", "));
+        return Err(Failure::Usage(anyhow!("{path}: {what}, nor a built-in scene; the built-in scenes are {names}")));
     }
     let stem = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
     Ok((stem, Scene::load(path, &options)?))
@@ -171,8 +167,8 @@ fn write_all(
     if let Some(path) = &args.stats {
         files.push(stage_json(path, &rendering.statistics)?);
     }
-    files.push(stage_png(&output.png, &rendering.image).map_err(RenderError::from)?);
-    files.push(stage_exr(&output.exr, &rendering.image, attributes).map_err(RenderError::from)?);
+    files.push(stage_png(&output.png, &rendering.image)?);
+    files.push(stage_exr(&output.exr, &rendering.image, attributes)?);
     StagedFile::persist_all(files).map_err(|error| Failure::Work(error.into()))
 }
 

@@ -6,11 +6,9 @@ use std::{
 };
 
 use anyhow::{Context as _, anyhow};
-use vdf_render::{
-    RenderError,
-    scene::{EmbeddedFile, GeneratedFile, builtin, builtin_names, generated},
-    write_atomically,
-};
+use vdf_image::write_atomically;
+use vdf_scene::EmbeddedFile;
+use vdf_scenes::{GeneratedFile, builtin, builtin_names, generated};
 
 use crate::{args::SceneCommand, failure::Failure, progress::Reporter};
 
@@ -28,8 +26,8 @@ pub(crate) fn run(command: &SceneCommand) -> Result<(), Failure> {
                     Failure::Usage(anyhow!("no built-in scene is called '{name}'; there are {names}"))
                 })?;
                 if triangles.is_some() {
-                    let message = format!("is for generated scenes; {name} always has the same triangles");
-                    return Err(RenderError::Option { option: "triangles", message }.into());
+                    let message = anyhow!("--triangles is for generated scenes; {name} always has the same triangles");
+                    return Err(Failure::Usage(message));
                 }
                 write(source.files().iter().map(SceneFile::Embedded), folder)
             }

@@ -3,10 +3,9 @@
 use std::io::Write as _;
 
 use anyhow::{Context as _, anyhow};
-use vdf_render::{
-    Method, check_writable,
-    verify::{VerifyOptions, VerifyReport, verify},
-};
+use vdf_image::check_writable;
+use vdf_lab::verify::{VerifyOptions, VerifyReport, verify};
+use vdf_visibility::Method;
 
 use crate::{
     args::{Methods, VerifyArgs},
@@ -27,7 +26,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<(), Failure> {
     }
 
     let reporter = Reporter::new(args.quiet)?;
-    let report = verify(&scene, &options, &reporter);
+    let report = verify(scene, &options, &reporter);
     reporter.finish();
     let report = report?;
     if reporter.interrupted() {
@@ -45,7 +44,7 @@ fn options(args: &VerifyArgs) -> VerifyOptions {
     let mut methods: Vec<Method> = Vec::new();
     for choice in &args.methods {
         match choice {
-            Methods::All => methods.extend(Method::ALL.into_iter().filter(|&m| m != Method::None)),
+            Methods::All => methods.extend(Method::proving()),
             Methods::One(method) => methods.push(*method),
         }
     }
@@ -78,7 +77,7 @@ fn verdict(report: &VerifyReport) -> Result<(), Failure> {
 mod tests {
     use std::process::ExitCode;
 
-    use vdf_render::verify::{Checks, Tally};
+    use vdf_lab::verify::{Checks, Tally};
 
     use super::*;
 

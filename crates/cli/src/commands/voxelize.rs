@@ -7,7 +7,9 @@ use std::{
 };
 
 use anyhow::Context as _;
-use vdf_render::{RenderOptions, SceneVoxels, write_atomically};
+use vdf_image::write_atomically;
+use vdf_lab::SceneVoxels;
+use vdf_render::PrepareOptions;
 use vdf_voxel::{VoxelGrid, VoxelSet, write_indices, write_obj};
 
 use crate::{
@@ -23,8 +25,9 @@ pub(crate) fn run(args: &VoxelizeArgs) -> Result<(), Failure> {
         say(format_args!("warning: {warning}"));
     }
     let reporter = Reporter::new(true)?;
-    let max_voxels = RenderOptions::default().max_voxels;
-    let voxels = SceneVoxels::build(&scene, args.method, args.voxel, max_voxels, args.threads)?;
+    let options =
+        PrepareOptions { voxel_size: args.voxel, threads: args.threads, ..PrepareOptions::with_method(args.method) };
+    let voxels = SceneVoxels::build(scene, &options, &reporter)?;
 
     let mut written = Vec::new();
     if let Some(folder) = &args.export {
@@ -77,11 +80,7 @@ fn summarize(args: &VoxelizeArgs, voxels: &SceneVoxels, written: &[PathBuf]) -> 
             writeln!(out, "emitter {i}      neighbourhood of {} voxels, {free:.2} % of the free ones", n.count())?;
         }
     }
-    let [voxelize, field, neighbourhoods] = voxels.build.seconds;
-    writeln!(
-        out,
-        "{:14} voxels {voxelize:.4} s, field {field:.4} s, neighbourhoods {neighbourhoods:.4} s",
-        args.method
-    )?;
+    let steps: Vec<_> = voxels.build.parts.iter().map(|p| format!("{} {:.4} s", p.name, p.seconds)).collect();
+    writeln!(out, "{:14} {}", args.method, steps.join(", "))?;
     written.iter().try_for_each(|path| writeln!(out, "wrote          {}", path.display()))
 }

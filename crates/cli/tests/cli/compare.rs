@@ -129,10 +129,10 @@ fn sizes_differ() {
 #[test]
 fn pixels_that_are_not_finite_are_named() {
     let sandbox = Sandbox::new();
-    let mut image = vdf_render::Image::new(5, 4);
-    vdf_render::write_exr(&sandbox.path().join("good.exr"), &image, &[]).unwrap();
+    let mut image = vdf_image::Image::new(5, 4);
+    vdf_image::write_exr(&sandbox.path().join("good.exr"), &image, &[]).unwrap();
     image.pixels[13].y = f32::NAN;
-    vdf_render::write_exr(&sandbox.path().join("bad.exr"), &image, &[]).unwrap();
+    vdf_image::write_exr(&sandbox.path().join("bad.exr"), &image, &[]).unwrap();
     let message = "cannot compare: bad.exr is (0, NaN, 0) at pixel (3, 2), counted from the top left";
     sandbox.fails(&["compare", "good.exr", "bad.exr"], 2, &[message]);
     sandbox.fails(&["compare", "bad.exr", "good.exr", "--map", "map.png"], 2, &[message]);

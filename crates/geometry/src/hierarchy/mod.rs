@@ -43,10 +43,7 @@ pub struct Bvh {
 
 impl std::fmt::Debug for Bvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Bvh")
-            .field("triangles", &self.triangles)
-            .field("bounds", &self.bounds)
-            .finish()
+        f.debug_struct("Bvh").field("triangles", &self.triangles).field("bounds", &self.bounds).finish()
     }
 }
 

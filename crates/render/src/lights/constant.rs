@@ -8,14 +8,7 @@ use crate::frame::sample_uniform_sphere;
 
 /// A sample of the background, whose directions are drawn with density `pdf` and followed for `reach` world units.
 #[inline]
-pub(super) fn sample(
-    emitter: usize,
-    from: DVec3,
-    u: [f64; 2],
-    background: Rgb,
-    pdf: f64,
-    reach: f64,
-) -> LightSample {
+pub(super) fn sample(emitter: usize, from: DVec3, u: [f64; 2], background: Rgb, pdf: f64, reach: f64) -> LightSample {
     let direction = sample_uniform_sphere(u);
     LightSample {
         emitter,

@@ -60,10 +60,7 @@ impl Extent {
     #[inline]
     pub(super) fn is_left(&self, segment: &Segment) -> bool {
         let (Segment { p, q }, Bounds { min, max }) = (*segment, self.bounds);
-        self.closed_box
-            && p.cmpgt(min).all()
-            && p.cmplt(max).all()
-            && (q.cmplt(min).any() || q.cmpgt(max).any())
+        self.closed_box && p.cmpgt(min).all() && p.cmplt(max).all() && (q.cmplt(min).any() || q.cmpgt(max).any())
     }
 }
 

@@ -145,7 +145,9 @@ fn a_box_and_its_triangles_say_the_same() {
             }
             let intervals = fast.intervals(&segment, Some(FOG));
             assert_eq!((intervals.free_flight(tau), intervals.optical_depth()), (flight, depth), "{segment:?}, {tau}");
-            let FreeFlight::Passed(end) = slow.free_flight(&segment, Some(FOG), f64::INFINITY) else { panic!("collides with all") };
+            let FreeFlight::Passed(end) = slow.free_flight(&segment, Some(FOG), f64::INFINITY) else {
+                panic!("collides with all")
+            };
             assert_eq!(intervals.end(), end);
         }
     }
