@@ -54,7 +54,6 @@ pub fn export(folder: &Path, prepared: &PreparedScene, stream: &QueryStream) -> 
 
 /// What a class of queries is called, and the names of its figures.
 struct ClassNames {
-    kind: QueryKind,
     name: &'static str,
     t_query: &'static str,
     unoccluded: &'static str,
@@ -65,7 +64,6 @@ struct ClassNames {
 /// All classes; those of spatial queries have the names of the thesis.
 const CLASSES: [ClassNames; 3] = [
     ClassNames {
-        kind: QueryKind::Spatial,
         name: "spatial",
         t_query: "t_query spatial",
         unoccluded: "unoccluded of spatial",
@@ -86,7 +84,6 @@ const CLASSES: [ClassNames; 3] = [
         ],
     },
     ClassNames {
-        kind: QueryKind::OnLight,
         name: "on an area light",
         t_query: "t_query on light",
         unoccluded: "unoccluded of on light",
@@ -107,7 +104,6 @@ const CLASSES: [ClassNames; 3] = [
         ],
     },
     ClassNames {
-        kind: QueryKind::Superficial,
         name: "superficial",
         t_query: "t_query superficial",
         unoccluded: "unoccluded of superficial",
