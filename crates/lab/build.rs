@@ -10,7 +10,8 @@ fn main() {
     export("VDF_RUSTC", output(Command::new(rustc).arg("--version")));
     export("VDF_PROFILE", env::var("PROFILE").ok());
     println!("cargo:rerun-if-changed=build.rs");
-    // A package that was unpacked or vendored may lie in another project's repository, whose commit says nothing about it.
+    // A package that was unpacked or vendored may lie in another project's repository, whose commit says nothing about
+    // it.
     if git(&["rev-parse", "--show-prefix"]).as_deref() == Some(PLACE) {
         let changed = git(&["status", "--porcelain", "--untracked-files=no"]).is_some_and(|s| !s.is_empty());
         let commit = git(&["rev-parse", "--short=12", "HEAD"]);
@@ -22,8 +23,8 @@ fn main() {
     }
 }
 
-/// Asks again after each commit and each change of what is measured. The command line is only glue: to watch it would compile
-/// this crate again for each change there.
+/// Asks again after each commit and each change of what is measured. The command line is only glue: to watch it would
+/// compile this crate again for each change there.
 fn watch() {
     let siblings = fs::read_dir("..").into_iter().flatten().flatten().map(|entry| entry.path());
     for folder in siblings.filter(|path| !path.ends_with("cli")) {

@@ -84,7 +84,8 @@ pub enum LabError {
     /// A replayed query was answered otherwise than it must be. This is a bug of the program, never of a scene.
     #[error("WRONG ANSWER: {0}")]
     WrongAnswer(Box<crate::queries::WrongAnswer>),
-    /// A pass that was timed answers otherwise than when it was checked. This is a bug of the program or of the machine.
+    /// A pass that was timed answers otherwise than when it was checked. This is a bug of the program or of the
+    /// machine.
     #[error("WRONG ANSWER: {method} says yes {found} times in a timed pass but {expected} times when checked")]
     UnstableAnswers {
         /// The method.

@@ -1,5 +1,6 @@
-//! Streams in memory and in files. The format, version 2, is described byte by byte in `docs/query-streams.md`: a header of 80 bytes,
-//! and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles that they are about.
+//! Streams in memory and in files. The format, version 2, is described byte by byte in `docs/query-streams.md`: a
+//! header of 80 bytes, and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles
+//! that they are about.
 
 use std::{
     fs::File,
@@ -250,9 +251,10 @@ pub(super) fn triangles_crc32(triangles: &[Triangle]) -> u32 {
     crc.finalize()
 }
 
-/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 2, u32 size of this header 32, u64 number of triangles, u32
-/// CRC-32 of all that follows the header, u32 0; then nine f32 each, the coordinates of three vertices. They are the exact geometry that the answers of a
-/// [`QueryStream`] are about. The file appears whole or not at all.
+/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 2, u32 size of this header 32, u64
+/// number of triangles, u32 CRC-32 of all that follows the header, u32 0; then nine f32 each, the coordinates of three
+/// vertices. They are the exact geometry that the answers of a [`QueryStream`] are about. The file appears whole or not
+/// at all.
 ///
 /// # Errors
 /// What the system says.

@@ -46,7 +46,8 @@ fn all_paths_ask_what_the_render_asks() {
     }
 }
 
-/// A stream with a bound: some of the whole paths of the unbounded one, in its order, the same for any number of threads.
+/// A stream with a bound: some of the whole paths of the unbounded one, in its order, the same for any number of
+/// threads.
 #[test]
 fn a_bounded_stream_is_a_deterministic_part() {
     let prepared = plain("cbox_vol2", "40");
@@ -214,7 +215,8 @@ fn a_replay_measures_all_methods() {
     assert!(matches!(error, LabError::NoQueries { .. }), "{error}");
 }
 
-/// Fog that only an area light lights: no query is spatial, but the light's neighbourhood proves some, and a replay says so.
+/// Fog that only an area light lights: no query is spatial, but the light's neighbourhood proves some, and a replay
+/// says so.
 #[test]
 fn proofs_towards_area_lights_are_a_class_of_their_own() {
     let text = r#"<scene version="3.0.0">

@@ -1,7 +1,8 @@
 //! Reports: what was measured, as words, as a page, as CSV and as JSON.
 //!
-//! A report makes [`Figure`]s, from which CSV and JSON follow, and a [`Page`] of tables and plots, from which the words and the HTML
-//! follow. Each report is one module with its options and a function `run`; [`REPORTS`] is the list of all.
+//! A report makes [`Figure`]s, from which CSV and JSON follow, and a [`Page`] of tables and plots, from which the words
+//! and the HTML follow. Each report is one module with its options and a function `run`; [`REPORTS`] is the list of
+//! all.
 //!
 //! *Guarantee.* Whatever is timed is checked in the same run: answers against the hierarchy's, images bit by bit.
 

@@ -47,7 +47,8 @@ pub struct Picture {
     height: u32,
 }
 
-/// Two images of one size, one over the other, with a slider that moves the border between them; side by side without a script.
+/// Two images of one size, one over the other, with a slider that moves the border between them; side by side without a
+/// script.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// What they show.

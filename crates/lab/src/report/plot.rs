@@ -18,7 +18,8 @@ pub struct Plot {
     size: [f64; 2],
 }
 
-/// A line to plot, and between which lines it might lie as well; these have as many points, one for each of the line's own.
+/// A line to plot, and between which lines it might lie as well; these have as many points, one for each of the line's
+/// own.
 #[derive(Clone, Debug)]
 pub struct Banded {
     /// The line.
@@ -65,7 +66,8 @@ const FRAME: [f64; 4] = [56.0, 12.0, 468.0, 254.0];
 pub(super) const COLOURS: usize = 6;
 
 impl Series {
-    /// A line without points in the style of a method, by its name: a colour for the field, a dash for the neighbourhood.
+    /// A line without points in the style of a method, by its name: a colour for the field, a dash for the
+    /// neighbourhood.
     pub(super) fn in_style_of(method: &str) -> Self {
         let method: Method = method.parse().unwrap_or(Method::NONE);
         let colour = match method.field() {
@@ -85,7 +87,8 @@ impl Series {
 }
 
 impl Plot {
-    /// Lines over axes that are both logarithmic. What is not positive and finite is left out; `None` if nothing remains.
+    /// Lines over axes that are both logarithmic. What is not positive and finite is left out; `None` if nothing
+    /// remains.
     #[must_use]
     pub fn logarithmic<S: Into<Banded>>(title: String, x_label: &str, y_label: &str, series: Vec<S>) -> Option<Self> {
         let series: Vec<Banded> = series
@@ -153,7 +156,8 @@ impl Axis {
         (10.0 * place).round() / 10.0
     }
 
-    /// Ticks at 1, 2 and 5 times powers of ten, at powers of ten alone where those would be many, at more where they would be few.
+    /// Ticks at 1, 2 and 5 times powers of ten, at powers of ten alone where those would be many, at more where they
+    /// would be few.
     fn ticks(&self) -> Vec<(f64, String)> {
         let steps: &[f64] = match self.high - self.low {
             decades if decades < 0.5 => &[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0],

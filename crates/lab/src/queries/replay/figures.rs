@@ -42,7 +42,8 @@ pub struct Replay {
 /// The hierarchy alone, without a method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HierarchyReplay {
-    /// Each class of which there are queries: first the spatial ones, then those on an area light, then the other superficial ones.
+    /// Each class of which there are queries: first the spatial ones, then those on an area light, then the other
+    /// superficial ones.
     pub classes: Vec<ClassReplay>,
     /// Any query of the stream: `t_query`.
     pub t_query: f64,
@@ -61,7 +62,8 @@ pub struct ClassReplay {
     pub time: Timing,
 }
 
-/// Queries of the hierarchy with a timer started and stopped around each (6.2.2 in \[Houska2013\]): those of the first class.
+/// Queries of the hierarchy with a timer started and stopped around each (6.2.2 in \[Houska2013\]): those of the first
+/// class.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimerInfluence {
     /// What a query takes in the pass with timers.
@@ -85,7 +87,8 @@ pub struct MethodReplay {
     pub t_build: f64,
     /// Each class that a method can prove and of which there are queries, in the order of [`HierarchyReplay::classes`].
     pub proofs: Vec<ProofReplay>,
-    /// How many times faster the mixture of all queries of the stream is than by the hierarchy alone; below 1 it is slower.
+    /// How many times faster the mixture of all queries of the stream is than by the hierarchy alone; below 1 it is
+    /// slower.
     pub speed_up_all: f64,
 }
 
@@ -104,8 +107,9 @@ pub struct ProofReplay {
     pub t_acc: Timing,
     /// A query: the proof, and the fallback where there is none.
     pub t_effective: Timing,
-    /// `t_acc` as the thesis computes it (6.3.2), from the whole: t_eff − (1 − p_acc)·t_query. Larger than [`Self::t_acc`] where proofs
-    /// alone overlap in the processor but a fallback has to wait for its proof; smaller where proved queries are the expensive ones.
+    /// `t_acc` as the thesis computes it (6.3.2), from the whole: t_eff − (1 − p_acc)·t_query. Larger than
+    /// [`Self::t_acc`] where proofs alone overlap in the processor but a fallback has to wait for its proof; smaller
+    /// where proved queries are the expensive ones.
     pub t_acc_derived: f64,
     /// A query of the hierarchy alone, in passes that alternated with those of this method.
     pub t_hierarchy: Timing,

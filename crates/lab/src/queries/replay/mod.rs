@@ -1,9 +1,9 @@
 //! Replaying a stream, per method and voxel size.
 //!
-//! *Idea.* What is timed is one whole pass over all queries of one class, on one thread. Passes of the hierarchy, of the proofs and of the
-//! proofs with the fallback take turns, as often as asked for, forwards and backwards through the methods. So a machine that grows
-//! slower or faster does so for all; a median is over the passes of one kind. A pass without any query is timed, too: the loop and the
-//! reading of the stream are part of all the other figures.
+//! *Idea.* What is timed is one whole pass over all queries of one class, on one thread. Passes of the hierarchy, of
+//! the proofs and of the proofs with the fallback take turns, as often as asked for, forwards and backwards through the
+//! methods. So a machine that grows slower or faster does so for all; a median is over the passes of one kind. A pass
+//! without any query is timed, too: the loop and the reading of the stream are part of all the other figures.
 //!
 //! *Cost.* The structures of one voxel size and one kind of field exist at a time, those of up to three methods.
 
@@ -63,9 +63,9 @@ impl ReplayOptions {
 
 /// Replays `stream` in `prepared`, whose own method does not matter.
 ///
-/// # Errors
-/// [`LabError::WrongAnswer`] at the first answer that differs from the hierarchy's, or if that differs from the stream's;
-/// [`LabError::NoQueries`] if no query can be proved; an option or voxel size that is not usable; or `progress` asks to stop.
+/// # Errors [`LabError::WrongAnswer`] at the first answer that differs from the hierarchy's, or if that differs from
+/// the stream's; [`LabError::NoQueries`] if no query can be proved; an option or voxel size that is not usable; or
+/// `progress` asks to stop.
 pub fn replay(
     prepared: &PreparedScene,
     stream: &QueryStream,

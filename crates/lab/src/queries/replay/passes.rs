@@ -21,7 +21,8 @@ impl Checked {
     }
 }
 
-/// Compares every answer with the truth: how many were proved, or the index of the first query that is answered wrongly.
+/// Compares every answer with the truth: how many were proved, or the index of the first query that is answered
+/// wrongly.
 pub(crate) fn check(visibility: &Visibility<'_>, queries: &[ShadowQuery], truth: &[bool]) -> Result<Checked, usize> {
     const BLOCK: usize = 4096;
     let answers = queries.par_chunks(BLOCK).zip(truth.par_chunks(BLOCK)).enumerate();

@@ -278,7 +278,8 @@ impl Class {
     }
 }
 
-/// The methods with their places in the list, grouped by the kind of their field: the structures of one group exist at a time.
+/// The methods with their places in the list, grouped by the kind of their field: the structures of one group exist at
+/// a time.
 fn by_field(methods: &[Method]) -> Vec<Vec<(usize, Method)>> {
     let mut groups: Vec<Vec<(usize, Method)>> = Vec::new();
     for (place, &method) in methods.iter().enumerate() {

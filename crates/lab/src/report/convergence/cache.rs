@@ -1,8 +1,9 @@
 //! References kept from one run to the next.
 //!
-//! A reference is three files: an EXR for each half, to be looked at or compared with other images, and a JSON that says what they are and
-//! has their checksums. What the name of the file and the JSON cannot tell, above all whether this program would still render the same,
-//! is asked of the pixels: a few are rendered again and must have the same bits (`references.rs`).
+//! A reference is three files: an EXR for each half, to be looked at or compared with other images, and a JSON that
+//! says what they are and has their checksums. What the name of the file and the JSON cannot tell, above all whether
+//! this program would still render the same, is asked of the pixels: a few are rendered again and must have the same
+//! bits (`references.rs`).
 
 use std::{
     fs, io,

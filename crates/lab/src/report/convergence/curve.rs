@@ -2,9 +2,10 @@
 
 /// The median of so many values, and which of them enclose it.
 ///
-/// *Definition.* Of n independent draws of any distribution, fewer than k lie below its median with the probability that fewer than k of
-/// n fair coins show heads. So the k-th smallest and the k-th largest enclose it with the probability 1 − 2·P(B(n, ½) < k).
-/// Taken is the largest k for which that is at least 15/16, what the smallest and the largest of five have.
+/// *Definition.* Of n independent draws of any distribution, fewer than k lie below its median with the probability
+/// that fewer than k of n fair coins show heads. So the k-th smallest and the k-th largest enclose it with the
+/// probability 1 − 2·P(B(n, ½) < k). Taken is the largest k for which that is at least 15/16, what the smallest and the
+/// largest of five have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MedianRule {
     /// From 1.
@@ -76,11 +77,11 @@ pub(super) enum Found {
     Beyond,
 }
 
-/// The time after which the error stays at `target` or below: `t_build`, and that of the render. `points` are times of renders in seconds and
-/// their errors, longer renders later. `None` if no point is of any use.
+/// The time after which the error stays at `target` or below: `t_build`, and that of the render. `points` are times of
+/// renders in seconds and their errors, longer renders later. `None` if no point is of any use.
 ///
-/// Between two renders both logarithms are interpolated; beyond the longest the error falls as 1/t, as that of any unbiased
-/// estimator with a variance does. If the error crosses the target several times the last time counts.
+/// Between two renders both logarithms are interpolated; beyond the longest the error falls as 1/t, as that of any
+/// unbiased estimator with a variance does. If the error crosses the target several times the last time counts.
 pub(super) fn time_to(points: &[(f64, f64)], t_build: f64, target: f64) -> Option<(f64, Found)> {
     let usable: Vec<_> = points.iter().copied().filter(|p| is_usable(*p)).collect();
     let (t_first, _) = *usable.first()?;
@@ -97,8 +98,8 @@ pub(super) fn time_to(points: &[(f64, f64)], t_build: f64, target: f64) -> Optio
     })
 }
 
-/// The exponent of the power law through the points, by least squares of logarithms; −1 is that of an unbiased estimator over samples. `None` with
-/// fewer than two usable places.
+/// The exponent of the power law through the points, by least squares of logarithms; −1 is that of an unbiased
+/// estimator over samples. `None` with fewer than two usable places.
 pub(super) fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<_> = points.iter().filter(|p| is_usable(**p)).map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;

@@ -86,8 +86,8 @@ pub(super) fn measure(renders: &Renders<'_>, name: &str, cache: &Cache) -> Resul
     Ok((Measured { threads, references, settings, t_build }, warnings))
 }
 
-/// The image that all methods make, and `T_render` of each. Method number `first`, counted around, is the first to render: so each is
-/// the first in its turn.
+/// The image that all methods make, and `T_render` of each. Method number `first`, counted around, is the first to
+/// render: so each is the first in its turn.
 fn by_all_methods(
     renders: &Renders<'_>,
     built: &[PreparedScene],

@@ -1,12 +1,13 @@
 //! The convergence report: speed against error.
 //!
-//! *Idea.* All methods make the same image, so a method changes the time that an error takes and nothing else; what an error takes is a
-//! matter of the integrator, its samples per segment and the samples per pixel.
+//! *Idea.* All methods make the same image, so a method changes the time that an error takes and nothing else; what an
+//! error takes is a matter of the integrator, its samples per segment and the samples per pixel.
 //!
-//! *Guarantee.* The images of all methods are compared bit by bit. No error is claimed that cannot be told from that of its reference.
+//! *Guarantee.* The images of all methods are compared bit by bit. No error is claimed that cannot be told from that of
+//! its reference.
 //!
-//! *Cost.* A reference has 16 times the samples of the longest render, but is kept from one run to the next. The structures of all
-//! methods exist at the same time, for renders take turns.
+//! *Cost.* A reference has 16 times the samples of the longest render, but is kept from one run to the next. The
+//! structures of all methods exist at the same time, for renders take turns.
 
 mod cache;
 mod curve;
@@ -36,9 +37,8 @@ use crate::LabError;
 
 /// Measures `scene`, called `name`, in the size that the options say. Writes references to their folder.
 ///
-/// # Errors
-/// If an option or the voxel size is not usable, the references cannot be kept, images differ that must be the same, or `progress`
-/// asks to stop.
+/// # Errors If an option or the voxel size is not usable, the references cannot be kept, images differ that must be the
+/// same, or `progress` asks to stop.
 pub fn run(
     name: &str,
     mut scene: Scene,

@@ -50,7 +50,8 @@ pub struct ConvergenceOptions {
 }
 
 impl Default for ConvergenceOptions {
-    /// `ndf`, `amr` and `amr-xsn`, both integrators, images 48 pixels wide with up to 32 samples per pixel and five seeds.
+    /// `ndf`, `amr` and `amr-xsn`, both integrators, images 48 pixels wide with up to 32 samples per pixel and five
+    /// seeds.
     fn default() -> Self {
         Self {
             methods: ["ndf", "amr", "amr-xsn"].iter().filter_map(|name| name.parse().ok()).collect(),

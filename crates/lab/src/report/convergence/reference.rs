@@ -1,12 +1,13 @@
 //! Converged images to measure errors against, and how wrong they are themselves.
 //!
-//! *Idea.* A reference R is the mean of two halves A and B, which differ in nothing but the seed. So (A − B)²/4 has the mean
-//! Var R, whatever the variance of a half: the reference tells its own error.
+//! *Idea.* A reference R is the mean of two halves A and B, which differ in nothing but the seed. So (A − B)²/4 has the
+//! mean Var R, whatever the variance of a half: the reference tells its own error.
 //!
-//! *Guarantee.* The seeds of the halves are those of no other render, so the error of an image x against R is on average
-//! E(x − μ)² + Var R, with the converged image μ: Var R, the *floor*, can be subtracted. For relMSE this holds but for the noise in its divisor,
-//! which is R's. All pixels have random numbers of their own, so the mean of (A − B)²/4 over n pixels has a standard error
-//! of at most their standard deviation over √n; the *bound* of the floor lies two of them above it.
+//! *Guarantee.* The seeds of the halves are those of no other render, so the error of an image x against R is on
+//! average E(x − μ)² + Var R, with the converged image μ: Var R, the *floor*, can be subtracted. For relMSE this holds
+//! but for the noise in its divisor, which is R's. All pixels have random numbers of their own, so the mean of (A −
+//! B)²/4 over n pixels has a standard error of at most their standard deviation over √n; the *bound* of the floor lies
+//! two of them above it.
 //!
 //! *Limits.* Light that neither half has found is in neither the floor nor the reference.
 
@@ -17,7 +18,8 @@ use vdf_image::{
 use vdf_render::Integrator;
 use vdf_scene::PixelRect;
 
-/// An error is claimed if it is so many times the bound of the floor: then the floor is at most a third of what remains.
+/// An error is claimed if it is so many times the bound of the floor: then the floor is at most a third of what
+/// remains.
 pub(super) const CLAIM: f64 = 4.0;
 
 /// A converged image.
@@ -51,8 +53,8 @@ impl Reference {
         Ok(Self { integrator, spp, image, floor, flip, cached })
     }
 
-    /// Whether these errors, with the floor, can be told from the reference's own. Both have to: a reference with much noise
-    /// is dark in pixels by chance, and its divisors make any relMSE large; MSE has none.
+    /// Whether these errors, with the floor, can be told from the reference's own. Both have to: a reference with much
+    /// noise is dark in pixels by chance, and its divisors make any relMSE large; MSE has none.
     pub(super) fn claims(&self, rel_mse: f64, mse: f64) -> bool {
         let above = |error: f64, bound: f64| error > 0.0 && error.is_finite() && error >= CLAIM * bound;
         above(rel_mse, self.floor.rel_mse_bound) && above(mse, self.floor.mse_bound)
@@ -108,8 +110,8 @@ fn mean(halves: &[Image; 2]) -> Image {
     Image { pixels: pixels.collect(), ..a.clone() }
 }
 
-/// The pixels of the film, at most 4 × 4, around the one where the halves differ most: nowhere does it show sooner if they
-/// were not what they are said to be.
+/// The pixels of the film, at most 4 × 4, around the one where the halves differ most: nowhere does it show sooner if
+/// they were not what they are said to be.
 pub(super) fn telling_pixels(halves: &[Image; 2]) -> PixelRect {
     let [a, b] = halves;
     let distance = |i: usize| a.pixels[i].distance_squared(b.pixels[i]);
@@ -172,9 +174,10 @@ mod tests {
         assert_eq!(Reference::new(Integrator::Volpath, 2, &[black.clone(), black], false).unwrap().floor.rel_mse, 0.0);
     }
 
-    /// Noise of a known variance, uniform with standard deviation s in a half: the floor is s²/2, and an image of variance v against the reference
-    /// has v + s²/2, so that v remains. 30 000 values; relative standard errors are below √(2/30 000) = 0.8 %, the
-    /// tolerance of 4 % is five of them (false alarm below 10⁻⁶, and the seeds are fixed).
+    /// Noise of a known variance, uniform with standard deviation s in a half: the floor is s²/2, and an image of
+    /// variance v against the reference has v + s²/2, so that v remains. 30 000 values; relative standard errors are
+    /// below √(2/30 000) = 0.8 %, the tolerance of 4 % is five of them (false alarm below 10⁻⁶, and the seeds are
+    /// fixed).
     #[test]
     fn the_floor_is_the_variance_of_the_reference() {
         let s = 0.2_f64;

@@ -49,7 +49,8 @@ pub(super) fn references(
     Ok((references, warnings))
 }
 
-/// One integrator for all that converge to the same image: that with the most samples per segment, whose variance is the least.
+/// One integrator for all that converge to the same image: that with the most samples per segment, whose variance is
+/// the least.
 fn one_for_each(integrators: &[Integrator]) -> Vec<Integrator> {
     let mut wanted: Vec<Integrator> = Vec::new();
     for &integrator in integrators {

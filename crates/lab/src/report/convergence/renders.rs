@@ -60,7 +60,8 @@ impl Renders<'_> {
         Ok((rendering.image, rendering.statistics.t_render))
     }
 
-    /// Both halves of a reference by the hierarchy alone, or a part of them, which only checks something and is no progress.
+    /// Both halves of a reference by the hierarchy alone, or a part of them, which only checks something and is no
+    /// progress.
     pub(super) fn halves(&self, integrator: Integrator, crop: Option<PixelRect>) -> Result<[Image; 2], LabError> {
         let half_spp = self.plan.half_spp;
         let progress = Paths { whole: self.progress, spp: if crop.is_some() { 0 } else { half_spp } };

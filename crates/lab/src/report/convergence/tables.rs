@@ -134,8 +134,8 @@ impl Summary<'_> {
         }
     }
 
-    /// A line for each method, through times and errors of the same samples. The band reaches from the lower ends of both intervals
-    /// to the upper ends.
+    /// A line for each method, through times and errors of the same samples. The band reaches from the lower ends of
+    /// both intervals to the upper ends.
     fn curves(&self, s: &SettingResult, claimed: &[usize], value: &dyn Fn(usize) -> Median) -> Vec<Banded> {
         (0..self.plan.methods.len()).map(|m| self.curve(s, m, claimed, value)).collect()
     }

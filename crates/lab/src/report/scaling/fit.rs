@@ -14,7 +14,8 @@ pub(super) struct PowerLaw {
 }
 
 impl PowerLaw {
-    /// Fits points (x, y), the largest x last. What is not positive and finite is left out; `None` if fewer than two different x remain.
+    /// Fits points (x, y), the largest x last. What is not positive and finite is left out; `None` if fewer than two
+    /// different x remain.
     pub(super) fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let usable = |v: f64| v > 0.0 && v.is_finite();
         let logs: Vec<(f64, f64)> =
@@ -69,8 +70,8 @@ mod tests {
         assert!((slope(1e6)..slope(4e5)).contains(&n_log_n.last_step), "{n_log_n:?}");
     }
 
-    /// By hand: ln x = 0, 1, 2, 3 and ln y = 0, 1, 1, 2. Slope 3/5, residuals ∓0.1 ±0.3 in pairs, their squares' sum 0.2,
-    /// so the standard error is √(0.2 / 2 / 5).
+    /// By hand: ln x = 0, 1, 2, 3 and ln y = 0, 1, 1, 2. Slope 3/5, residuals ∓0.1 ±0.3 in pairs, their squares' sum
+    /// 0.2, so the standard error is √(0.2 / 2 / 5).
     #[test]
     fn the_standard_error_is_that_of_a_slope() {
         let points = [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 2.0)].map(|(x, y): (f64, f64)| (x.exp(), y.exp()));

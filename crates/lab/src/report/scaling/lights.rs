@@ -24,7 +24,8 @@ pub(super) fn sizes(most: u32) -> Vec<u64> {
     halvings(1, most.into())
 }
 
-/// Light `i`, of the sequence R₃ of Roberts (multiples of powers of 1/g, g⁴ = g + 1): any number of first ones is spread evenly.
+/// Light `i`, of the sequence R₃ of Roberts (multiples of powers of 1/g, g⁴ = g + 1): any number of first ones is
+/// spread evenly.
 fn position(i: u32) -> [f64; 3] {
     const G: f64 = 1.220_744_084_605_759_5;
     let [low, high] = CORNERS;

@@ -133,8 +133,8 @@ impl Lab<'_> {
         replay(alone, &stream, &options, &part)
     }
 
-    /// Renders with each of `built`, again and again, taking turns: seconds and statistics of each. Every image is compared with
-    /// `expected`, or, if there is none, with the first.
+    /// Renders with each of `built`, again and again, taking turns: seconds and statistics of each. Every image is
+    /// compared with `expected`, or, if there is none, with the first.
     pub(super) fn renders(
         &self,
         built: &[PreparedScene],

@@ -1,9 +1,10 @@
 //! The scaling report: how costs grow with triangles, voxels, lights and threads.
 //!
-//! *Idea.* Each sweep multiplies one thing and measures several quantities; a power law is fitted to each of these. Repetitions take turns
-//! where several things are compared, so that a machine that grows slower does so for all.
+//! *Idea.* Each sweep multiplies one thing and measures several quantities; a power law is fitted to each of these.
+//! Repetitions take turns where several things are compared, so that a machine that grows slower does so for all.
 //!
-//! *Guarantee.* Answers of proofs are compared with the hierarchy's, images bit by bit between methods and numbers of threads.
+//! *Guarantee.* Answers of proofs are compared with the hierarchy's, images bit by bit between methods and numbers of
+//! threads.
 
 mod fit;
 mod lights;

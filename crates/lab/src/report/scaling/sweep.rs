@@ -75,7 +75,8 @@ impl Group {
         }
     }
 
-    /// The same quantities as how many times better the first point is divided by x / first x: 1 if all threads help fully.
+    /// The same quantities as how many times better the first point is divided by x / first x: 1 if all threads help
+    /// fully.
     pub(super) fn efficiency(&self, title: &'static str) -> Self {
         let line = |line: &Line| {
             let point = |p: &Point| {

@@ -147,7 +147,8 @@ impl Bench<'_> {
     }
 }
 
-/// `T_query` in seconds of `n` queries, of which the spatial ones take `t_spatial` ns and the others what they took in the replay.
+/// `T_query` in seconds of `n` queries, of which the spatial ones take `t_spatial` ns and the others what they took in
+/// the replay.
 pub(super) fn total(n: f64, p_sp: f64, replay: &Replay, t_spatial: f64) -> f64 {
     1e-9 * n * (p_sp * t_spatial + (1.0 - p_sp) * replay.hierarchy.t_other())
 }

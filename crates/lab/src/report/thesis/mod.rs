@@ -1,9 +1,11 @@
 //! The thesis report: chapter 6 of \[Houska2013\], measured again.
 //!
-//! *Idea.* Every figure stands beside that of the thesis, and the gain that inequality 2.7 predicts beside the gain measured.
+//! *Idea.* Every figure stands beside that of the thesis, and the gain that inequality 2.7 predicts beside the gain
+//! measured.
 //!
-//! *Limits.* `T_query` is N times the time of a query in a replay, not the sum of a timer in the loop, which distorts both (6.2.2). Flights
-//! are not proved (`segment_first` is off), so that proofs only ever save visibility queries, as there.
+//! *Limits.* `T_query` is N times the time of a query in a replay, not the sum of a timer in the loop, which distorts
+//! both (6.2.2). Flights are not proved (`segment_first` is off), so that proofs only ever save visibility queries, as
+//! there.
 
 mod acceleration_tables;
 mod bench;

@@ -56,7 +56,8 @@ pub(super) struct MethodResult {
     pub(super) p_acc_sp: f64,
 }
 
-/// `T_build` and `T_render` (with it) on all threads, where they are more than one. In seconds, scaled as on one thread.
+/// `T_build` and `T_render` (with it) on all threads, where they are more than one. In seconds, scaled as on one
+/// thread.
 #[derive(Clone, Copy)]
 pub(super) struct Threaded {
     pub(super) t_build: f64,
