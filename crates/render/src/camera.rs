@@ -2,7 +2,7 @@
 
 use glam::{DVec3, dvec3};
 use vdf_geometry::Segment;
-use vdf_scene::{FilmSettings, MediumId, PerspectiveSensor};
+use vdf_scene::{FilmSettings, PerspectiveSensor};
 
 /// A camera and its film, prepared for rays.
 #[derive(Clone, Copy, Debug)]
@@ -20,23 +20,25 @@ impl Camera {
     }
 
     /// The camera ray through film position (`x`, `y`) in pixels from the top left corner of the full film: a segment from
-    /// the near to the far plane, and its unit direction. Same geometry as Mitsuba 3 `perspective`.
+    /// the near to the far plane, but no longer than `reach` world units, and its unit direction. Same geometry as Mitsuba 3 `perspective`.
     #[inline]
     #[must_use]
-    pub fn ray(&self, x: f64, y: f64) -> (Segment, DVec3) {
+    pub fn ray(&self, x: f64, y: f64, reach: f64) -> (Segment, DVec3) {
         let [width, height] = self.size;
         let s = &self.sensor;
         let t = s.tan_half_fov_x;
         let local = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
         let p = s.world_from_camera.transform_point3(local * s.near_clip);
-        let q = s.world_from_camera.transform_point3(local * s.far_clip);
-        (Segment::new(p, q), s.world_from_camera.transform_vector3(local).normalize())
+        let direction = s.world_from_camera.transform_vector3(local).normalize();
+        // A plane beyond all of the scene clips nothing; squares of its distance would overflow.
+        let q = if s.far_clip < reach { s.world_from_camera.transform_point3(local * s.far_clip) } else { p + direction * reach };
+        (Segment::new(p, q), direction)
     }
 
-    /// The medium around the camera; `None` is vacuum.
+    /// Where all rays come from.
     #[inline]
     #[must_use]
-    pub const fn medium(&self) -> Option<MediumId> {
-        self.sensor.medium
+    pub fn position(&self) -> DVec3 {
+        self.sensor.world_from_camera.w_axis.truncate()
     }
 }

@@ -3,12 +3,12 @@
 //! Every random number is a function of (seed, pixel, sample, dimension), so a path is the same whoever follows it, and in whatever order.
 
 use vdf_scene::{PixelRect, ReconstructionFilter, Rgb};
-use vdf_visibility::{Counters, Recorder, Visibility};
+use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
 use crate::{
-    Camera, Integrator, PreparedScene, RenderOptions, Sampler,
+    Camera, Integrator, PreparedScene, Progress, RenderOptions, Sampler,
     film::sample_filter,
-    integrator::{PathRay, Tracer},
+    integrator::Tracer,
 };
 
 /// Side of a tile in pixels. Only progress sees tiles.
@@ -26,7 +26,6 @@ pub struct Job<'a> {
 }
 
 /// Follows the paths of a job; one for each thread or for all of them.
-#[derive(Debug)]
 pub struct PathTracer<'a, R> {
     tracer: Tracer<'a, R>,
     camera: Camera,
@@ -95,19 +94,24 @@ impl<'a> Job<'a> {
             .collect()
     }
 
-    /// Who follows the paths, asking the scene's own provers.
+    /// Who follows the paths, asking the scene's own provers. A path that goes on and on asks `progress` whether to stop; then its radiance
+    /// is not to be used.
     #[must_use]
-    pub fn tracer(&self) -> PathTracer<'a, vdf_visibility::NoRecorder> {
-        self.tracer_with(self.prepared.visibility().segment_first(self.options.segment_first))
+    pub fn tracer(&self, progress: &'a dyn Progress) -> PathTracer<'a, NoRecorder> {
+        self.tracer_with(self.prepared.visibility().segment_first(self.options.segment_first), progress)
     }
 
     /// Who follows the paths and lets `recorder` hear of every visibility query.
     #[must_use]
-    pub fn recording_tracer<R: Recorder>(&self, recorder: R) -> PathTracer<'a, R> {
-        self.tracer_with(self.prepared.visibility().recorded(recorder))
+    pub fn recording_tracer<R: Recorder>(&self, recorder: R, progress: &'a dyn Progress) -> PathTracer<'a, R> {
+        self.tracer_with(self.prepared.visibility().recorded(recorder), progress)
     }
 
-    fn tracer_with<R: Recorder>(&self, visibility: Visibility<'a, R>) -> PathTracer<'a, R> {
+    fn tracer_with<R: Recorder>(
+        &self,
+        visibility: Visibility<'a, R>,
+        progress: &'a dyn Progress,
+    ) -> PathTracer<'a, R> {
         let scene = self.prepared.scene();
         PathTracer {
             tracer: Tracer {
@@ -115,6 +119,7 @@ impl<'a> Job<'a> {
                 visibility,
                 settings: scene.integrator,
                 transmittance: self.options.transmittance,
+                progress,
             },
             camera: self.camera,
             filter: scene.film.filter,
@@ -124,14 +129,21 @@ impl<'a> Job<'a> {
     }
 }
 
+impl<R> std::fmt::Debug for PathTracer<'_, R> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PathTracer").field("integrator", &self.integrator).field("seed", &self.seed).finish_non_exhaustive()
+    }
+}
+
 impl<R: Recorder> PathTracer<'_, R> {
     /// The radiance of one path: sample number `sample` of pixel (`x`, `y`) of the full film.
     #[inline]
     pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> Rgb {
         let mut sampler = Sampler::new(self.seed, x, y, sample);
         let [dx, dy] = sample_filter(&self.filter, &mut sampler);
-        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy);
-        let ray = PathRay { segment, direction, medium: self.camera.medium() };
+        let world = self.tracer.world;
+        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
+        let ray = self.tracer.camera_ray(self.camera.position(), segment, direction);
         self.tracer.radiance(self.integrator, ray, &mut sampler, counters)
     }
 }

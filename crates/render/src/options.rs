@@ -27,6 +27,16 @@ impl TransmittanceEstimator {
     }
 }
 
+/// What a voxel grid covers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GridExtent {
+    /// The occluders, and point emitters near them ([`World::occluder_bounds`](crate::World)).
+    #[default]
+    Occluders,
+    /// The whole scene with fog, lights and camera, as in the thesis (5.2 in \[Houska2013\]).
+    Scene,
+}
+
 /// How a scene is prepared; see [`PreparedScene`](crate::PreparedScene). `None` leaves it to the default named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrepareOptions {
@@ -34,6 +44,8 @@ pub struct PrepareOptions {
     pub method: Option<Method>,
     /// Side of a voxel in world units; by default a 128th of the longest side of what the grid covers.
     pub voxel_size: Option<f64>,
+    /// What the voxel grid covers; by default the occluders and the lights near them.
+    pub grid: GridExtent,
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
     /// Number of threads; by default one for each processor.
@@ -43,7 +55,7 @@ pub struct PrepareOptions {
 impl Default for PrepareOptions {
     /// At most 2²⁹ voxels (4 GiB), all else by default.
     fn default() -> Self {
-        Self { method: None, voxel_size: None, max_voxels: 1 << 29, threads: None }
+        Self { method: None, voxel_size: None, grid: GridExtent::Occluders, max_voxels: 1 << 29, threads: None }
     }
 }
 

@@ -67,7 +67,7 @@ impl PreparedScene {
         }
         progress.phase("distance field");
         let lights = light_shapes(&scene);
-        let bounds = world.bounds;
+        let bounds = *world.grid_bounds(options.grid);
         let method = options.method.unwrap_or_else(|| Method::for_lights(&lights));
         let voxel_size = options.voxel_size.unwrap_or_else(|| default_voxel_size(&bounds));
         let options = ProverOptions { method, voxel_size, max_voxels: options.max_voxels };

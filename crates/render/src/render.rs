@@ -25,7 +25,7 @@ pub struct Rendering {
 }
 
 /// Renders on the current pool of threads.
-pub(crate) fn render(job: &Job<'_>, progress: &dyn Progress) -> Result<Rendering, RenderError> {
+pub(crate) fn render<'a>(job: &Job<'a>, progress: &'a dyn Progress) -> Result<Rendering, RenderError> {
     progress.phase("rendering");
     let start = Instant::now();
     let [width, height] = job.size();
@@ -55,8 +55,8 @@ pub(crate) fn render(job: &Job<'_>, progress: &dyn Progress) -> Result<Rendering
     Ok(Rendering { image, statistics })
 }
 
-fn render_tile(job: &Job<'_>, tile: PixelRect, progress: &dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
-    let tracer = job.tracer();
+fn render_tile<'a>(job: &Job<'a>, tile: PixelRect, progress: &'a dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
+    let tracer = job.tracer(progress);
     let mut counters = Counters::default();
     let pixels = (tile.y0..tile.y1)
         .flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)))
@@ -73,6 +73,10 @@ fn render_tile(job: &Job<'_>, tile: PixelRect, progress: &dyn Progress) -> Resul
                 } else {
                     counters.refused += 1;
                 }
+            }
+            // The last path may have stopped on its way.
+            if progress.cancelled() {
+                return Err(RenderError::Cancelled);
             }
             Ok((sum / f64::from(job.spp())).as_vec3())
         })

@@ -5,7 +5,7 @@ use vdf_geometry::{Bounds, Bvh, Hit, Triangle};
 use vdf_scene::{Bsdf, Emitter, Rgb, Scene};
 use vdf_visibility::LightShape;
 
-use crate::{lights::Lights, media::Media};
+use crate::{GridExtent, lights::Lights, media::Media};
 
 /// What the integrators need of a scene. Immutable and shared by all threads.
 #[derive(Debug)]
@@ -18,13 +18,14 @@ pub struct World {
     pub lights: Lights,
     /// All occluders, surface by surface.
     pub triangles: Vec<Triangle>,
-    /// Bounds of occluders, medium boundaries and point emitters: what a voxel grid has to cover.
+    /// Bounds of occluders, medium boundaries, point emitters and the camera.
     pub bounds: Bounds,
+    /// What a voxel grid for proofs has to cover: the occluders, and point emitters near them.
+    pub occluder_bounds: Bounds,
+    /// Whether the camera's far plane may hide something.
+    pub(crate) far_plane_clips: bool,
     surface_of_triangle: Vec<u32>,
     surfaces: Vec<SurfaceData>,
-    /// How far a ray starts from its surface: more than the rounding of a hit's position, and nothing beside a single-precision
-    /// vertex's.
-    lift: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -66,19 +67,30 @@ impl World {
                 surfaces[*surface].emitter = Some(i);
             }
         }
-        let bounds = bounds(scene, &triangles);
-        let camera = scene.sensor.world_from_camera.w_axis.truncate();
-        let with_camera = bounds.with(camera);
-        let largest = with_camera.largest_coordinate();
+        let bvh = Bvh::new(&triangles);
+        let boundaries = Bounds::of_triangles(scene.boundaries.iter().flat_map(|b| &b.triangles));
+        // No ray has to come near an emitter that is a point, so that a sun far away takes nobody's precision.
+        let matter = bvh.bounds().union(boundaries).with(scene.sensor.world_from_camera.w_axis.truncate());
+        let bounds = positions(scene).fold(matter, Bounds::with);
         Self {
-            bvh: Bvh::new(&triangles),
-            media: Media::new(&scene.media, &scene.boundaries),
-            lights: Lights::new(scene, reach(scene, with_camera.extent().length()), largest * LIFT),
+            media: Media::of_scene(scene),
+            lights: Lights::new(scene, reach(scene, matter.extent().length())),
+            far_plane_clips: scene.sensor.far_clip < matter.extent().length(),
+            occluder_bounds: occluder_bounds(scene, &bvh, bounds),
+            bvh,
             triangles,
             bounds,
             surface_of_triangle,
             surfaces,
-            lift: largest * LIFT,
+        }
+    }
+
+    /// What a voxel grid of this extent covers.
+    #[must_use]
+    pub const fn grid_bounds(&self, extent: GridExtent) -> &Bounds {
+        match extent {
+            GridExtent::Occluders => &self.occluder_bounds,
+            GridExtent::Scene => &self.bounds,
         }
     }
 
@@ -95,7 +107,7 @@ impl World {
         let front = direction.dot(normal) < 0.0;
         let normal = if front { normal } else { -normal };
         SurfacePoint {
-            point: a * wa + b * wb + c * wc + normal * self.lift,
+            point: a * wa + b * wb + c * wc + normal * lift(triangle),
             normal,
             reflectance: if front { data.bsdf.front } else { data.bsdf.back },
             emitted: if front { data.radiance } else { Rgb::ZERO },
@@ -104,19 +116,33 @@ impl World {
     }
 }
 
-/// A hit's position errs by less than 2⁻⁴⁹ of the largest coordinate (three products and two sums in double precision); this is
-/// 2¹⁷ times as much, and still 2⁸ times finer than a single-precision vertex.
-const LIFT: f64 = 1.0 / 4_294_967_296.0;
+/// How far a ray starts from the triangle that it leaves, in world units: more than the rounding of a hit's position, and nothing beside a
+/// single-precision vertex's. It depends on the triangle alone: a far camera or light must not let rays leak through a wall.
+///
+/// A hit's position errs by less than 2⁻⁴⁹ of the triangle's largest coordinate (three products and two sums in double precision); this is
+/// 2¹⁷ times as much, and still 2⁸ times finer than the step of single precision there.
+#[inline]
+pub(crate) fn lift(triangle: &Triangle) -> f64 {
+    let [a, b, c] = triangle.vertices_f64().map(|v| v.abs());
+    a.max(b).max(c).max_element() * (1.0 / 4_294_967_296.0)
+}
 
-/// The box around occluders, medium boundaries and point emitters; around the camera if there are none.
-fn bounds(scene: &Scene, triangles: &[Triangle]) -> Bounds {
-    let boundaries = scene.boundaries.iter().flat_map(|b| &b.triangles);
-    let lights = scene
-        .emitters
-        .iter()
-        .filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None });
-    let bounds = Bounds::of_points(triangles.iter().chain(boundaries).flat_map(Triangle::vertices_f64).chain(lights));
-    if bounds.is_empty() { Bounds::of_points([scene.sensor.world_from_camera.w_axis.truncate()]) } else { bounds }
+/// The point emitters' positions.
+fn positions(scene: &Scene) -> impl Iterator<Item = DVec3> {
+    scene.emitters.iter().filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None })
+}
+
+/// The bounds of the occluders, and of the point emitters that are no farther from them than half their longest side: those get
+/// neighbourhoods. Fog, camera and far emitters would only make the voxels coarser; queries from outside are clipped. Without any occluder
+/// all of the scene.
+fn occluder_bounds(scene: &Scene, bvh: &Bvh, all: Bounds) -> Bounds {
+    let occluders = *bvh.bounds();
+    if occluders.is_empty() {
+        return all;
+    }
+    let near = 0.5 * occluders.extent().max_element();
+    let close = Bounds::new(occluders.min - near, occluders.max + near);
+    positions(scene).filter(|p| close.contains(*p)).fold(occluders, Bounds::with)
 }
 
 /// Where the emitters of `scene` are, as far as proofs are concerned.

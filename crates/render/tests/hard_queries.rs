@@ -486,7 +486,7 @@ fn case_35_at_the_light() {
     for &light in &f.lights {
         f.free(light, light);
         scene.emitters = vec![Emitter::Point { position: light, intensity: Rgb::ONE }];
-        let lights = Lights::new(&scene, 100.0, 1e-9);
+        let lights = Lights::new(&scene, 100.0);
         assert!(lights.sample(light, 0.5, [0.5, 0.5]).is_none());
         let beside = v(light.x, light.y, light.z.next_up());
         let near = lights.sample(beside, 0.5, [0.5, 0.5]).expect("a light");

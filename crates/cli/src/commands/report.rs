@@ -92,6 +92,7 @@ fn run_convergence(args: &ReportConvergenceArgs) -> Result<(), Failure> {
         size: args.size.unwrap_or(standard.size),
         cache: args.cache.clone(),
         threads: args.threads,
+        ..standard
     };
     options.validate()?;
     let (name, scene) = load(args.scene.as_deref(), &args.defines)?;

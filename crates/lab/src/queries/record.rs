@@ -155,7 +155,7 @@ impl Recording<'_> {
     fn tile(&self, tile: PixelRect, fraction: f64) -> Result<QueryLog, RenderError> {
         let job = &self.job;
         let log = TileLog::default();
-        let tracer = job.recording_tracer(&log);
+        let tracer = job.recording_tracer(&log, self.progress);
         let mut counters = Counters::default();
         for y in tile.y0..tile.y1 {
             for x in tile.x0..tile.x1 {

@@ -23,7 +23,7 @@ use std::{array, sync::Arc, time::Instant};
 use rayon::prelude::*;
 use vdf_geometry::Bounds;
 use vdf_render::{
-    PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
+    GridExtent, PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
 };
 use vdf_scene::Scene;
 use vdf_visibility::{Answer, Method, Provers, QueryKind, ShadowQuery};
@@ -58,6 +58,8 @@ pub struct VerifyOptions {
     /// Sides of voxels in world units, between which the segments are divided; if empty a 128th of the scene's longest
     /// side.
     pub voxel_sizes: Vec<f64>,
+    /// What the voxel grids cover.
+    pub grid: GridExtent,
     /// Number of segments in all, at least 1; divided evenly between the classes.
     pub segments: u64,
     /// Seed of the segments.
@@ -74,6 +76,7 @@ impl Default for VerifyOptions {
         Self {
             methods: Method::proving().collect(),
             voxel_sizes: vec![],
+            grid: GridExtent::default(),
             segments: 1_000_000,
             seed: 0,
             threads: None,
@@ -126,7 +129,7 @@ fn verify_in_pool(
     let world = prepared.world();
     let oracle = Oracle::new(world);
     let sizes = match options.voxel_sizes.as_slice() {
-        [] => vec![default_voxel_size(&world.bounds)],
+        [] => vec![default_voxel_size(world.grid_bounds(options.grid))],
         sizes => sizes.to_vec(),
     };
     let names: Vec<_> = options.methods.iter().map(|m| m.name()).collect();
@@ -137,7 +140,7 @@ fn verify_in_pool(
     let mut seconds = 0.0;
     for (number, &voxel_size) in (0u32..).zip(&sizes) {
         progress.phase("distance fields");
-        let grid = grid_over(&world.bounds, voxel_size, options.max_voxels)?;
+        let grid = grid_over(world.grid_bounds(options.grid), voxel_size, options.max_voxels)?;
         let vertices = world.triangles.par_iter().map(|t| t.vertices);
         let occupied = voxelize(&grid, vertices.clone())?;
         let excess = occupied.validate(&grid, vertices)?;
@@ -149,6 +152,7 @@ fn verify_in_pool(
             let options = PrepareOptions {
                 method: Some(method),
                 voxel_size: Some(voxel_size),
+                grid: options.grid,
                 max_voxels: options.max_voxels,
                 threads: options.threads,
             };

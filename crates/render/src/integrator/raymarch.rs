@@ -23,15 +23,15 @@ impl<R: Recorder> Tracer<'_, R> {
     pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
-            let (hit, free) = self.cast(&path.ray, counters);
-            let intervals = self.world.media.intervals(&free, path.ray.medium);
+            let (surface, free) = self.cast(&path.ray, counters);
+            let intervals = self.world.media.intervals(&free, &path.ray.regions);
             let tau = intervals.optical_depth();
             if tau > 0.0 && self.may_scatter(path.depth + 1) {
                 let light = self.in_scattered(&free, &intervals, path.ray.direction, tau, samples, sampler, counters);
                 path.radiance += path.throughput * light;
             }
             path.throughput *= to_f32((-tau).exp());
-            if !self.arrive(&mut path, hit, intervals.end(), sampler, counters) {
+            if !self.arrive(&mut path, surface, intervals.end().clone(), sampler, counters) {
                 break;
             }
         }
@@ -54,12 +54,15 @@ impl<R: Recorder> Tracer<'_, R> {
         let width = -(-tau).exp_m1() / f64::from(samples);
         let mut sum = Rgb::ZERO;
         for k in 0..samples {
+            if self.stops_at(k) {
+                break;
+            }
             let depth = stratum_depth(k, width, sampler.next_1d());
             // Rounding may place the last sample an ulp beyond the end; it is worth nothing there.
-            if let FreeFlight::Collision { t, medium } = intervals.free_flight(depth) {
+            if let FreeFlight::Collision { t, medium, regions } = intervals.free_flight(depth) {
                 let m = self.world.media.medium(medium);
                 let vertex = Vertex::InMedium { phase: m.phase, direction };
-                sum += m.albedo * self.direct_light_alone(free.at(t), &vertex, medium, sampler, counters);
+                sum += m.albedo * self.direct_light_alone(free.at(t), &vertex, &regions, sampler, counters);
             }
         }
         sum * to_f32(width)

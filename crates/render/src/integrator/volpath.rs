@@ -8,19 +8,19 @@
 //! peer's 0/1 estimate; equal in the mean, less noisy.
 
 use glam::DVec3;
-use vdf_geometry::Hit;
+use vdf_geometry::Segment;
 use vdf_scene::{MediumId, Rgb};
 use vdf_visibility::{Counters, Recorder};
 
 use super::{Origin, Path, PathRay, Tracer, Vertex, sample_free_flight};
-use crate::{PhaseFunction as _, Sampler, media::FreeFlight};
+use crate::{PhaseFunction as _, RegionSet, Sampler, media::FreeFlight, world::SurfacePoint};
 
 /// What a ray comes to.
 enum Event {
     /// A collision with the medium.
-    Collision { point: DVec3, medium: MediumId },
-    /// The first surface, or none; reached in this medium.
-    Arrival { hit: Option<Hit>, medium: Option<MediumId> },
+    Collision { point: DVec3, medium: MediumId, regions: RegionSet },
+    /// The first surface, or none; reached in these regions.
+    Arrival { surface: Option<SurfacePoint>, regions: RegionSet },
 }
 
 impl<R: Recorder> Tracer<'_, R> {
@@ -30,7 +30,7 @@ impl<R: Recorder> Tracer<'_, R> {
         while self.goes_on(&mut path, sampler) {
             let tau = sample_free_flight(sampler);
             match self.first_event(&path, tau, counters) {
-                Event::Collision { point, medium } => {
+                Event::Collision { point, medium, regions } => {
                     path.depth += 1;
                     if !self.may_scatter(path.depth) {
                         break;
@@ -38,16 +38,15 @@ impl<R: Recorder> Tracer<'_, R> {
                     let m = self.world.media.medium(medium);
                     path.throughput *= m.albedo;
                     let vertex = Vertex::InMedium { phase: m.phase, direction: path.ray.direction };
-                    path.radiance +=
-                        path.throughput * self.direct_light(point, &vertex, Some(medium), sampler, counters);
+                    path.radiance += path.throughput * self.direct_light(point, &vertex, &regions, sampler, counters);
                     let direction = m.phase.sample_direction(path.ray.direction, sampler.next_2d());
                     let pdf = m.phase.pdf_direction(path.ray.direction, direction);
                     path.origin = Origin::Scattering { point, pdf };
                     path.on_surface = false;
-                    path.ray = self.ray(point, direction, Some(medium));
+                    path.ray = self.ray(point, direction, regions);
                 }
-                Event::Arrival { hit, medium } => {
-                    if !self.arrive(&mut path, hit, medium, sampler, counters) {
+                Event::Arrival { surface, regions } => {
+                    if !self.arrive(&mut path, surface, regions, sampler, counters) {
                         break;
                     }
                 }
@@ -61,23 +60,29 @@ impl<R: Recorder> Tracer<'_, R> {
     fn first_event(&self, path: &Path, tau: f64, counters: &mut Counters) -> Event {
         let ray = &path.ray;
         let media = &self.world.media;
-        if let Some(medium) = ray.medium
+        let start = media.medium_in(&ray.regions);
+        if let Some(medium) = start
             && let Some(flight) = media.short_flight(&ray.segment, medium, tau)
         {
             return match self.visibility.intersect_flight(&flight, !path.on_surface, counters) {
-                None => Event::Collision { point: flight.q, medium },
-                hit => Event::Arrival { hit, medium: Some(medium) },
+                None => Event::Collision { point: flight.q, medium, regions: ray.regions.clone() },
+                Some(hit) => {
+                    let surface = self.world.surface_point(&hit, ray.direction);
+                    // The way to the surface is a part of the flight, but where a ray starts from a surface is beside that.
+                    let regions = media.at_end(&Segment::new(flight.p, surface.point), &ray.regions);
+                    Event::Arrival { surface: Some(surface), regions }
+                }
             };
         }
-        let (hit, free) = self.cast(ray, counters);
-        if let (None, Some(medium)) = (hit, ray.medium)
+        let (surface, free) = self.cast(ray, counters);
+        if let (None, Some(medium)) = (surface, start)
             && media.leaves_for_good(&ray.segment, medium, tau)
         {
-            return Event::Arrival { hit, medium: None };
+            return Event::Arrival { surface: None, regions: RegionSet::default() };
         }
-        match media.free_flight(&free, ray.medium, tau) {
-            FreeFlight::Collision { t, medium } => Event::Collision { point: free.at(t), medium },
-            FreeFlight::Passed(medium) => Event::Arrival { hit, medium },
+        match media.free_flight(&free, &ray.regions, tau) {
+            FreeFlight::Collision { t, medium, regions } => Event::Collision { point: free.at(t), medium, regions },
+            FreeFlight::Passed(regions) => Event::Arrival { surface, regions },
         }
     }
 }

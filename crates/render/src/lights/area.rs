@@ -5,6 +5,7 @@ use vdf_geometry::Triangle;
 use vdf_scene::Rgb;
 
 use super::LightSample;
+use crate::world::lift;
 
 /// The triangles of one shape that shines.
 #[derive(Debug)]
@@ -40,7 +41,6 @@ impl AreaLight {
         from: DVec3,
         u: [f64; 2],
         choices: f64,
-        lift: f64,
     ) -> Option<LightSample> {
         // Nothing can be sampled on an emitter without area.
         if self.area() <= 0.0 {
@@ -58,7 +58,7 @@ impl AreaLight {
         let pdf = distance2 / (cos_theta * self.area() * choices);
         Some(LightSample {
             emitter,
-            point: point + normal * lift,
+            point: point + normal * lift(triangle),
             direction,
             weight: self.radiance * (1.0 / pdf) as f32,
             pdf,

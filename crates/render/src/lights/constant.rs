@@ -6,15 +6,15 @@ use vdf_scene::Rgb;
 use super::LightSample;
 use crate::frame::sample_uniform_sphere;
 
-/// A sample of the background, whose directions are drawn with density `pdf` and followed for `reach` world units.
+/// A sample of an emitter of this radiance, whose directions are drawn with density `pdf` and followed for `reach` world units.
 #[inline]
-pub(super) fn sample(emitter: usize, from: DVec3, u: [f64; 2], background: Rgb, pdf: f64, reach: f64) -> LightSample {
+pub(super) fn sample(emitter: usize, from: DVec3, u: [f64; 2], radiance: Rgb, pdf: f64, reach: f64) -> LightSample {
     let direction = sample_uniform_sphere(u);
     LightSample {
         emitter,
         point: from + direction * reach,
         direction,
-        weight: background * (1.0 / pdf) as f32,
+        weight: radiance * (1.0 / pdf) as f32,
         pdf,
         on_surface: false,
     }

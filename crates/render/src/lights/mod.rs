@@ -17,15 +17,13 @@ pub struct Lights {
     background: Rgb,
     /// How far a direction is followed before it is infinitely far away, in world units.
     reach: f64,
-    /// How far a sampled point is lifted off its surface, in world units.
-    lift: f64,
 }
 
 #[derive(Debug)]
 enum Light {
     Point { position: DVec3, intensity: Rgb },
     Area(AreaLight),
-    Constant,
+    Constant { radiance: Rgb },
 }
 
 /// A point on an emitter as seen from a place in the scene.
@@ -46,10 +44,9 @@ pub struct LightSample {
 }
 
 impl Lights {
-    /// Prepares the emitters of `scene`. `reach` is longer than any way through the scene, `lift` clears the rounding of a surface point;
-    /// both in world units.
+    /// Prepares the emitters of `scene`. `reach` is longer than any path through the scene, in world units.
     #[must_use]
-    pub fn new(scene: &Scene, reach: f64, lift: f64) -> Self {
+    pub fn new(scene: &Scene, reach: f64) -> Self {
         let mut background = Rgb::ZERO;
         let lights = scene
             .emitters
@@ -62,11 +59,11 @@ impl Lights {
                 }
                 Emitter::Constant { radiance } => {
                     background += radiance;
-                    Light::Constant
+                    Light::Constant { radiance }
                 }
             })
             .collect();
-        Self { lights, background, reach, lift }
+        Self { lights, background, reach }
     }
 
     /// Radiance of a ray that leaves the scene.
@@ -86,14 +83,14 @@ impl Lights {
         let choices = n as f64;
         match &self.lights[emitter] {
             Light::Point { position, intensity } => point::sample(emitter, *position, *intensity, from, choices),
-            Light::Area(light) => light.sample(emitter, from, u, choices, self.lift),
-            Light::Constant => {
-                Some(constant::sample(emitter, from, u, self.background, self.pdf_background(), self.reach))
+            Light::Area(light) => light.sample(emitter, from, u, choices),
+            Light::Constant { radiance } => {
+                Some(constant::sample(emitter, from, u, *radiance, self.pdf_background(), self.reach))
             }
         }
     }
 
-    /// The density with which [`Lights::sample`] draws any one direction of the background.
+    /// The density with which [`Lights::sample`] draws any one direction of any one constant emitter.
     #[inline]
     #[must_use]
     pub fn pdf_background(&self) -> f64 {

@@ -1,11 +1,10 @@
 //! The parts of a segment that lie in one medium each.
 
-use std::ops::ControlFlow;
-
 use smallvec::SmallVec;
+use vdf_geometry::Segment;
 use vdf_scene::MediumId;
 
-use super::{FreeFlight, Media};
+use super::{FreeFlight, Media, RegionSet};
 
 /// A part of a segment inside one medium (or in vacuum).
 #[derive(Clone, Copy, Debug)]
@@ -22,10 +21,12 @@ pub struct MediumInterval {
 #[derive(Debug)]
 pub struct MediumIntervals<'a> {
     pub(super) media: &'a Media,
+    pub(super) segment: Segment,
     /// Length of the segment in world units.
     pub(super) length: f64,
-    pub(super) start: Option<MediumId>,
-    pub(super) intervals: SmallVec<[MediumInterval; 4]>,
+    pub(super) start: RegionSet,
+    pub(super) intervals: SmallVec<[(MediumInterval, RegionSet); 4]>,
+    pub(super) end: RegionSet,
 }
 
 impl MediumIntervals<'_> {
@@ -33,25 +34,27 @@ impl MediumIntervals<'_> {
     #[inline]
     #[must_use]
     pub fn optical_depth(&self) -> f64 {
-        self.intervals.iter().fold(0.0, |tau, i| tau + self.media.interval_depth(i, self.length))
+        self.intervals.iter().fold(0.0, |tau, (i, _)| tau + self.media.interval_depth(i, self.length))
     }
 
     /// As [`Media::free_flight`].
     #[inline]
     #[must_use]
     pub fn free_flight(&self, tau: f64) -> FreeFlight {
-        let mut left = DepthLeft { tau, last: self.start };
-        match self.intervals.iter().try_for_each(|i| left.spend(self.media, i, self.length)) {
-            ControlFlow::Break(flight) => flight,
-            ControlFlow::Continue(()) => FreeFlight::Passed(left.last),
+        let mut left = DepthLeft { tau };
+        for (i, regions) in &self.intervals {
+            if let Some((t, medium)) = left.spend(self.media, i, self.length) {
+                return self.media.collision(&self.segment, &self.start, t, medium, i, regions.clone());
+            }
         }
+        FreeFlight::Passed(self.end.clone())
     }
 
-    /// The medium at the end.
+    /// The regions at the end.
     #[inline]
     #[must_use]
-    pub fn end(&self) -> Option<MediumId> {
-        self.intervals.last().map_or(self.start, |i| i.medium)
+    pub const fn end(&self) -> &RegionSet {
+        &self.end
     }
 }
 
@@ -60,23 +63,20 @@ impl MediumIntervals<'_> {
 pub(super) struct DepthLeft {
     /// Optical depth.
     pub(super) tau: f64,
-    /// The medium of the last interval.
-    pub(super) last: Option<MediumId>,
 }
 
 impl DepthLeft {
-    /// Goes through one interval, or ends in it.
+    /// Goes through one interval (`None`), or ends in it: where, and in which medium.
     #[inline]
-    pub(super) fn spend(&mut self, media: &Media, i: &MediumInterval, length: f64) -> ControlFlow<FreeFlight> {
-        self.last = i.medium;
+    pub(super) fn spend(&mut self, media: &Media, i: &MediumInterval, length: f64) -> Option<(f64, MediumId)> {
         let depth = media.interval_depth(i, length);
         if let Some(medium) = i.medium
             && self.tau < depth
         {
             let t = i.t0 + media.medium(medium).distance_at_depth(self.tau, length);
-            return ControlFlow::Break(FreeFlight::Collision { t: t.min(i.t1), medium });
+            return Some((t.min(i.t1), medium));
         }
         self.tau -= depth;
-        ControlFlow::Continue(())
+        None
     }
 }

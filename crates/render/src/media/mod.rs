@@ -1,36 +1,41 @@
 //! Participating media along a segment: which medium where, optical depth, transmittance, free flight.
 //!
-//! The interface that integrators use, whatever the medium: [`Media::intervals`] cuts a segment at the medium boundaries
-//! (`boundaries.rs`); optical depths and distances within an interval are the medium's own affair, one file a kind. [`Homogeneous`] is the
-//! first kind.
+//! The interface that integrators use, whatever the medium: a path carries the [`RegionSet`] of where it is, [`Media::intervals`] cuts a
+//! segment at the boundaries of regions (`regions.rs`), and optical depths and distances within an interval are the medium's own affair,
+//! one file a kind. [`Homogeneous`] is the first kind.
 
-mod boundaries;
+mod extent;
 mod homogeneous;
 mod intervals;
+mod regions;
 #[cfg(test)]
 mod tests;
 
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use smallvec::SmallVec;
 use vdf_geometry::Segment;
-use vdf_scene::{Boundary, Medium, MediumId};
+use vdf_scene::{Boundary, Medium, MediumId, Scene};
 
-use self::{boundaries::Boundaries, intervals::DepthLeft};
+use self::{intervals::DepthLeft, regions::Regions};
 pub use self::{
     homogeneous::Homogeneous,
     intervals::{MediumInterval, MediumIntervals},
+    regions::RegionSet,
 };
 
-/// The media of a scene and their boundaries, prepared for walks along segments.
+/// The media of a scene and the regions that they fill, prepared for walks along segments.
 #[derive(Debug)]
 pub struct Media {
     media: Vec<Homogeneous>,
-    boundaries: Boundaries,
+    regions: Regions,
+    /// The regions that the camera is inside of.
+    at_camera: RegionSet,
 }
 
 /// What a free flight along a segment comes to.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum FreeFlight {
     /// A collision at parameter `t` in `medium`.
     Collision {
@@ -38,16 +43,31 @@ pub enum FreeFlight {
         t: f64,
         /// The medium there.
         medium: MediumId,
+        /// The regions there.
+        regions: RegionSet,
     },
-    /// The end was reached, in this medium.
-    Passed(Option<MediumId>),
+    /// The end was reached, in these regions.
+    Passed(RegionSet),
 }
 
 impl Media {
-    /// Prepares media and boundaries. Cost: that of a hierarchy over the triangles of the boundaries.
+    /// Prepares media and boundaries, which have to be closed; `ambient` is the medium outside of all boundaries. Cost: that of a hierarchy
+    /// over the triangles of the boundaries.
     #[must_use]
-    pub fn new(media: &[Medium], boundaries: &[Boundary]) -> Self {
-        Self { media: media.iter().map(Homogeneous::from).collect(), boundaries: Boundaries::new(boundaries) }
+    pub fn new(media: &[Medium], boundaries: &[Boundary], ambient: Option<MediumId>) -> Self {
+        let regions = Regions::new(boundaries, ambient);
+        Self { media: media.iter().map(Homogeneous::from).collect(), regions, at_camera: RegionSet::default() }
+    }
+
+    /// Prepares the media of a scene. The ambient medium is the sensor's if the camera is outside of all boundaries, else what the outermost
+    /// boundary around the camera names for its outer side.
+    #[must_use]
+    pub fn of_scene(scene: &Scene) -> Self {
+        let mut media = Self::new(&scene.media, &scene.boundaries, None);
+        let at_camera = media.regions.at(scene.sensor.world_from_camera.w_axis.truncate());
+        let outside = at_camera == RegionSet::default();
+        media.regions.set_ambient(if outside { scene.sensor.medium } else { media.regions.around(&at_camera) });
+        Self { at_camera, ..media }
     }
 
     /// The medium with this number.
@@ -57,49 +77,112 @@ impl Media {
         &self.media[id.0 as usize]
     }
 
-    /// exp(−∫σ_t) along the segment, which starts in medium `start` [Houska2013, Sec. 2.1].
+    /// The medium of a point in these regions, that of the innermost; `None` is vacuum.
     #[inline]
     #[must_use]
-    pub fn transmittance(&self, segment: &Segment, start: Option<MediumId>) -> f64 {
+    pub fn medium_in(&self, regions: &RegionSet) -> Option<MediumId> {
+        self.regions.medium(regions)
+    }
+
+    /// The regions that `point` is inside of. Cost: in proportion to the triangles of the boundaries around it.
+    #[must_use]
+    pub fn regions_at(&self, point: DVec3) -> RegionSet {
+        self.regions.at(point)
+    }
+
+    /// The regions that the camera is inside of.
+    #[inline]
+    #[must_use]
+    pub const fn at_camera(&self) -> &RegionSet {
+        &self.at_camera
+    }
+
+    /// The regions at the end of the segment, which starts in `start`.
+    #[inline]
+    #[must_use]
+    pub fn at_end(&self, segment: &Segment, start: &RegionSet) -> RegionSet {
+        self.regions.at_end(segment, start)
+    }
+
+    /// True if the segment crosses no boundary of a medium.
+    #[inline]
+    #[must_use]
+    pub fn crosses_nothing(&self, segment: &Segment) -> bool {
+        self.regions.are_not_crossed(segment)
+    }
+
+    /// exp(−∫σ_t) along the segment, which starts in `start` [Houska2013, Sec. 2.1].
+    #[inline]
+    #[must_use]
+    pub fn transmittance(&self, segment: &Segment, start: &RegionSet) -> f64 {
         (-self.optical_depth(segment, start)).exp()
     }
 
-    /// ∫σ_t along the segment, which starts in medium `start`.
+    /// ∫σ_t along the segment, which starts in `start`.
     #[inline]
     #[must_use]
-    pub fn optical_depth(&self, segment: &Segment, start: Option<MediumId>) -> f64 {
+    pub fn optical_depth(&self, segment: &Segment, start: &RegionSet) -> f64 {
         let length = segment.length();
         let mut tau = 0.0;
-        let _ = self.boundaries.walk(segment, start, |i| {
+        let _ = self.regions.walk(segment, start, |i, _| {
             tau += self.interval_depth(&i, length);
             ControlFlow::<()>::Continue(())
         });
         tau
     }
 
-    /// The free flight of optical depth `tau` along the segment, which starts in medium `start`: a collision where the depth is reached,
-    /// if it is. If `tau` is −ln(1 − ξ), that is where a photon collides first.
+    /// The free flight of optical depth `tau` along the segment, which starts in `start`: a collision where the depth is reached, if it is.
+    /// If `tau` is −ln(1 − ξ), that is where a photon collides first.
     #[inline]
     #[must_use]
-    pub fn free_flight(&self, segment: &Segment, start: Option<MediumId>, tau: f64) -> FreeFlight {
+    pub fn free_flight(&self, segment: &Segment, start: &RegionSet, tau: f64) -> FreeFlight {
         let length = segment.length();
-        let mut left = DepthLeft { tau, last: start };
-        match self.boundaries.walk(segment, start, |i| left.spend(self, &i, length)) {
-            ControlFlow::Break(flight) => flight,
-            ControlFlow::Continue(()) => FreeFlight::Passed(left.last),
+        let mut left = DepthLeft { tau };
+        let spend = |i: MediumInterval, regions: &RegionSet| match left.spend(self, &i, length) {
+            Some((t, medium)) => ControlFlow::Break((t, medium, i, regions.clone())),
+            None => ControlFlow::Continue(()),
+        };
+        match self.regions.walk(segment, start, spend) {
+            ControlFlow::Break((t, medium, i, regions)) => self.collision(segment, start, t, medium, &i, regions),
+            ControlFlow::Continue(regions) => FreeFlight::Passed(regions),
         }
     }
 
-    /// The intervals of the segment, which starts in medium `start`.
+    /// A collision at `t` in an interval. So close to the interval's ends that the rounded point may lie on the other side of a boundary, the
+    /// regions are those of the point.
+    #[inline]
+    fn collision(
+        &self,
+        segment: &Segment,
+        start: &RegionSet,
+        t: f64,
+        medium: MediumId,
+        i: &MediumInterval,
+        regions: RegionSet,
+    ) -> FreeFlight {
+        let tolerance = self.regions.tolerance(segment);
+        let regions = if t - i.t0 <= tolerance || i.t1 - t <= tolerance {
+            self.regions.at_end(&Segment::new(segment.p, segment.at(t)), start)
+        } else {
+            regions
+        };
+        FreeFlight::Collision { t, medium, regions }
+    }
+
+    /// The intervals of the segment, which starts in `start`.
     #[inline]
     #[must_use]
-    pub fn intervals(&self, segment: &Segment, start: Option<MediumId>) -> MediumIntervals<'_> {
+    pub fn intervals(&self, segment: &Segment, start: &RegionSet) -> MediumIntervals<'_> {
         let mut intervals = SmallVec::new();
-        let _ = self.boundaries.walk(segment, start, |i| {
-            intervals.push(i);
-            ControlFlow::<()>::Continue(())
+        let walked = self.regions.walk(segment, start, |i, regions| {
+            intervals.push((i, regions.clone()));
+            ControlFlow::<std::convert::Infallible>::Continue(())
         });
-        MediumIntervals { media: self, length: segment.length(), start, intervals }
+        let end = match walked {
+            ControlFlow::Continue(regions) => regions,
+            ControlFlow::Break(never) => match never {},
+        };
+        MediumIntervals { media: self, segment: *segment, length: segment.length(), start: start.clone(), intervals, end }
     }
 
     /// The path of a free flight of optical depth `tau` that starts in `medium`, if it ends in this medium before the segment does and
@@ -113,7 +196,7 @@ impl Media {
             return None;
         }
         let flight = Segment::new(segment.p, segment.at(t));
-        self.boundaries.are_not_crossed(&flight).then_some(flight)
+        self.regions.are_not_crossed(&flight).then_some(flight)
     }
 
     /// True only if a flight of optical depth `tau`, if no surface stops it, does not collide: it starts in `medium`, leaves it where it is
@@ -127,7 +210,7 @@ impl Media {
     pub fn leaves_for_good(&self, segment: &Segment, medium: MediumId, tau: f64) -> bool {
         let t = self.medium(medium).distance_at_depth(tau, segment.length());
         // NaN, too, becomes 1.
-        self.boundaries.are_left_for_good(segment.p, segment.at(t.min(1.0)))
+        self.regions.are_left_for_good(segment.p, segment.at(t.min(1.0)))
     }
 
     #[inline]

@@ -1,11 +1,25 @@
 //! All provers of one scene: a prover for each light, and the field that they share.
 
 use glam::DVec3;
-use vdf_distfield::Neighbourhood as _;
-use vdf_voxel::{VoxelGrid, VoxelSet};
+use vdf_distfield::Neighbourhood;
+use vdf_voxel::{Span, VoxelGrid, VoxelSet};
 
 use super::{Answer, DistanceField, FieldProver, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
+
+/// What the neighbourhood of a point light at `to`, in the grid, says of a segment. One that comes from outside is clipped to the grid: its
+/// part inside lies in the cuboid of the voxel where it enters and that of the light, outside of which there is nothing to be met.
+#[inline]
+fn by_neighbourhood<N: Neighbourhood>(grid: &VoxelGrid, neighbourhood: &N, from: DVec3, to: DVec3) -> Answer {
+    if let Some(voxel) = grid.voxel_containing(from) {
+        return Answer::unoccluded_if(neighbourhood.proves(voxel));
+    }
+    Answer::unoccluded_if(match grid.voxel_span(from, to) {
+        Span::Outside => true,
+        // Clipping moves the voxels apart where an end is on a face by rounding; then the light's may not be its own.
+        Span::Inside(entry, light) => grid.voxel_containing(to) == Some(light) && neighbourhood.proves(entry),
+    })
+}
 
 /// What a method built for a scene.
 #[derive(Debug)]
@@ -65,11 +79,10 @@ impl Provers {
     #[inline]
     fn answer_spatial(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
         let (Some(grid), Some(light)) = (&self.grid, self.lights.get(emitter)) else { return Answer::Unknown };
-        // A neighbourhood knows nothing of points outside the grid; the field clips them.
-        match (light, grid.voxel_containing(from)) {
-            (LightProver::Safe(n), Some(voxel)) => Answer::unoccluded_if(n.proves(voxel)),
-            (LightProver::Extended(n), Some(voxel)) => Answer::unoccluded_if(n.proves(voxel)),
-            _ => self.answer_between(from, to),
+        match light {
+            LightProver::Safe(n) => by_neighbourhood(grid, n, from, to),
+            LightProver::Extended(n) => by_neighbourhood(grid, n, from, to),
+            LightProver::Field | LightProver::Area(_) => self.answer_between(from, to),
         }
     }
 

@@ -11,7 +11,7 @@ mod figures;
 mod passes;
 mod run;
 
-use vdf_render::{PreparedScene, Progress, check_voxel_size, on_threads};
+use vdf_render::{GridExtent, PreparedScene, Progress, check_voxel_size, on_threads};
 use vdf_visibility::Method;
 
 pub use self::figures::{
@@ -29,6 +29,8 @@ pub struct ReplayOptions {
     pub methods: Vec<Method>,
     /// Sides of voxels in world units; if empty a 128th of the scene's longest side.
     pub voxel_sizes: Vec<f64>,
+    /// What the voxel grids cover.
+    pub grid: GridExtent,
     /// Passes over the stream that a median is taken of; at least 1.
     pub passes: u32,
     /// Number of threads that build and check; by default one for each processor. Queries are always timed on one.
@@ -40,7 +42,14 @@ pub struct ReplayOptions {
 impl Default for ReplayOptions {
     /// All methods, one voxel size, medians of five passes.
     fn default() -> Self {
-        Self { methods: Method::all().collect(), voxel_sizes: vec![], passes: 5, threads: None, max_voxels: 1 << 29 }
+        Self {
+            methods: Method::all().collect(),
+            voxel_sizes: vec![],
+            grid: GridExtent::default(),
+            passes: 5,
+            threads: None,
+            max_voxels: 1 << 29,
+        }
     }
 }
 

@@ -89,7 +89,7 @@ impl<'a> Replaying<'a> {
 
     pub(super) fn run(&self, options: &ReplayOptions) -> Result<Replay, LabError> {
         let sizes = match &options.voxel_sizes[..] {
-            [] => vec![default_voxel_size(&self.prepared.world().bounds)],
+            [] => vec![default_voxel_size(self.prepared.world().grid_bounds(options.grid))],
             sizes => sizes.to_vec(),
         };
         let mut methods: Vec<Method> = Vec::new();
@@ -144,6 +144,7 @@ impl<'a> Replaying<'a> {
         let options = PrepareOptions {
             method: Some(method),
             voxel_size: Some(size),
+            grid: options.grid,
             max_voxels: options.max_voxels,
             threads: options.threads,
         };

@@ -50,7 +50,7 @@ pub fn run(
     scene.film = resized(scene.film, options.size);
     let none = PrepareOptions { threads: options.threads, ..PrepareOptions::with_method(Method::NONE) };
     let prepared = PreparedScene::new(scene, &none, progress)?;
-    let plan = Plan::new(options, default_voxel_size(&prepared.world().bounds));
+    let plan = Plan::new(options, default_voxel_size(prepared.world().grid_bounds(options.grid)));
     let renders = Renders { plan: &plan, alone: &prepared, progress };
     let (measured, warnings) = measure::measure(&renders, name, &cache)?;
     let summary = Summary::new(name, &plan, &measured, &prepared.scene().film);

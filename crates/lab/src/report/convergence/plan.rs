@@ -2,7 +2,7 @@
 
 use std::{iter, path::PathBuf};
 
-use vdf_render::{Integrator, check_threads, check_voxel_size};
+use vdf_render::{GridExtent, Integrator, check_threads, check_voxel_size};
 use vdf_scene::{FilmSettings, PixelRect};
 use vdf_visibility::Method;
 
@@ -31,6 +31,8 @@ pub struct ConvergenceOptions {
     pub methods: Vec<Method>,
     /// Side of a voxel in world units; by default a 128th of the scene's longest side.
     pub voxel_size: Option<f64>,
+    /// What the voxel grid covers.
+    pub grid: GridExtent,
     /// The integrators, each with its samples per segment; at least one.
     pub integrators: Vec<Integrator>,
     /// The most samples per pixel; renders have 1, 2, 4, ... up to this.
@@ -56,6 +58,7 @@ impl Default for ConvergenceOptions {
         Self {
             methods: ["ndf", "amr", "amr-xsn"].iter().filter_map(|name| name.parse().ok()).collect(),
             voxel_size: None,
+            grid: GridExtent::default(),
             integrators: vec![Integrator::Volpath, Integrator::raymarch(Integrator::SAMPLES_PER_SEGMENT)],
             max_spp: 32,
             reference_spp: None,
@@ -113,6 +116,7 @@ pub(super) struct Plan {
     /// Samples per pixel of each half of a reference.
     pub(super) half_spp: u32,
     pub(super) voxel_size: f64,
+    pub(super) grid: GridExtent,
     pub(super) threads: Option<usize>,
 }
 
@@ -132,6 +136,7 @@ impl Plan {
             seeds: (0..options.seeds as u64).map(|i| options.first_seed + i).collect(),
             half_spp: options.reference_spp().div_ceil(2),
             voxel_size: options.voxel_size.unwrap_or(default_voxel_size),
+            grid: options.grid,
             threads: options.threads,
         }
     }

@@ -41,6 +41,7 @@ impl Renders<'_> {
         look(self.progress)?;
         let options = PrepareOptions {
             voxel_size: Some(self.plan.voxel_size),
+            grid: self.plan.grid,
             threads: self.plan.threads,
             ..PrepareOptions::with_method(method)
         };

@@ -51,7 +51,7 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
         let light = |i| Emitter::Point { position: position(i).into(), intensity };
         let emitters = (0..n as u32).map(light).collect();
         let alone = lab.prepare(Scene { emitters, ..scene.clone() })?;
-        let size = default_voxel_size(&alone.world().bounds);
+        let size = default_voxel_size(&alone.world().occluder_bounds);
         let threads = lab.options.threads;
         let builds = lab.builds(&alone, &[sn, xsn], size, threads)?;
         for (name, from) in [("sn", sn), ("xsn", xsn)] {

@@ -42,7 +42,7 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
     );
     let scene = lab.builtin(SCENE)?;
     let alone = lab.prepare(scene)?;
-    let size = alone.world().bounds.extent().max_element() / f64::from(lab.options.voxels_for_threads);
+    let size = alone.world().occluder_bounds.extent().max_element() / f64::from(lab.options.voxels_for_threads);
     let mut image = None;
     let mut proved = None;
     let methods = FIELDS.map(|(_, from)| method(from));

@@ -132,7 +132,7 @@ impl Curves {
         let alone = lab.prepare(scene)?;
         let world = alone.world();
         let x = world.triangles.len() as f64;
-        let size = default_voxel_size(&world.bounds);
+        let size = default_voxel_size(&world.occluder_bounds);
         let threads = lab.options.threads;
         build.push("hierarchy", x, &lab.hierarchies(world, threads)?);
         memory.push("hierarchy", x, &[world.bvh.bytes() as f64]);

@@ -38,7 +38,7 @@ pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
 
     let scene = lab.builtin(SCENE)?;
     let alone = lab.prepare(scene)?;
-    let volume = alone.world().bounds.extent().element_product();
+    let volume = alone.world().occluder_bounds.extent().element_product();
     for n in sizes(lab.options.max_voxels_per_side) {
         lab.step("voxels", format_args!("{n}³"));
         let size = volume.cbrt() / n as f64;

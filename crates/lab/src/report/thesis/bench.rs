@@ -1,7 +1,7 @@
 //! How it is measured: scenes, builds, renders and replays as the thesis's tables want them.
 
 use vdf_image::Image;
-use vdf_render::{Integrator, PrepareOptions, PreparedScene, Progress, RenderOptions, Statistics};
+use vdf_render::{GridExtent, Integrator, PrepareOptions, PreparedScene, Progress, RenderOptions, Statistics};
 use vdf_scene::{LoadOptions, Scene};
 use vdf_scenes::builtin;
 use vdf_visibility::Method;
@@ -18,6 +18,9 @@ use crate::{
 
 /// A render that takes less is repeated, up to five times, and the median taken. In seconds.
 const SHORT: f64 = 0.2;
+
+/// The thesis's grids cover the whole scene (5.2).
+const GRID: GridExtent = GridExtent::Scene;
 
 /// How and with what it is measured.
 pub(super) struct Bench<'a> {
@@ -77,7 +80,8 @@ impl Bench<'_> {
     ) -> Result<PreparedScene, LabError> {
         look(self.progress)?;
         let threads = Some(threads);
-        let options = PrepareOptions { voxel_size: Some(size), threads, ..PrepareOptions::with_method(method) };
+        let options =
+            PrepareOptions { voxel_size: Some(size), grid: GRID, threads, ..PrepareOptions::with_method(method) };
         Ok(alone.with_options(&options, &Part(self.progress))?)
     }
 
@@ -140,6 +144,7 @@ impl Bench<'_> {
         let options = ReplayOptions {
             methods: methods.to_vec(),
             voxel_sizes: sizes.to_vec(),
+            grid: GRID,
             passes,
             ..ReplayOptions::default()
         };
