@@ -24,7 +24,7 @@ mod record;
 mod replay;
 mod stream;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use record::record_queries;
 pub use replay::{

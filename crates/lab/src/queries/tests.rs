@@ -215,10 +215,8 @@ fn a_replay_measures_all_methods() {
     assert!(matches!(error, LabError::NoQueries { .. }), "{error}");
 }
 
-/// Fog that only an area light lights: no query is spatial, but the light's neighbourhood proves some, and a replay
-/// says so.
-#[test]
-fn proofs_towards_area_lights_are_a_class_of_their_own() {
+/// Fog that only an area light lights.
+pub(crate) fn lamp() -> Scene {
     let text = r#"<scene version="3.0.0">
         <integrator type="volpath"/>
         <sensor type="perspective">
@@ -238,8 +236,14 @@ fn proofs_towards_area_lights_are_a_class_of_their_own() {
     </scene>"#;
     let file = vdf_scene::EmbeddedFile { path: "lamp.xml".into(), text: text.into() };
     let source = vdf_scene::SceneSource::embedded(file, vec![]);
-    let scene = Scene::from_source(&source, &LoadOptions::default()).unwrap();
-    let prepared = self::prepared(scene, Method::NONE);
+    Scene::from_source(&source, &LoadOptions::default()).unwrap()
+}
+
+/// Where only an area light lights fog no query is spatial, but the light's neighbourhood proves some, and a replay
+/// says so.
+#[test]
+fn proofs_towards_area_lights_are_a_class_of_their_own() {
+    let prepared = self::prepared(lamp(), Method::NONE);
     let options = options(RAYMARCH, 2);
     let stream = record_queries(&prepared, &options, 5000, &Quiet).unwrap();
     assert_eq!(stream.spatial(), 0);
