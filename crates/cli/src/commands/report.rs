@@ -151,22 +151,15 @@ fn methods(choices: &[Methods]) -> Vec<Method> {
 
 /// The integrators that two options name together: each name with each number of samples, if it takes any.
 fn integrators(names: &[Integrator], all_samples: &[u32]) -> Result<Vec<Integrator>, Failure> {
-    let mut integrators = Vec::new();
-    for &name in names {
-        let with = all_samples.iter().filter_map(|&n| name.with_samples_per_segment(n));
-        let before = integrators.len();
-        integrators.extend(with);
-        if integrators.len() == before {
-            integrators.push(name);
-        }
-    }
     // Samples that no integrator takes are a mistake.
-    if let (Some(&name), Some(&n)) = (names.first(), all_samples.first())
-        && integrators.iter().all(|i| i.samples_per_segment().is_none())
-    {
-        integrator(name, Some(n))?;
+    if names.iter().all(|name| name.samples_per_segment().is_none()) {
+        names.first().map(|&name| integrator(name, all_samples.first().copied())).transpose()?;
     }
-    Ok(integrators)
+    let with_samples = |&name: &Integrator| {
+        let with: Vec<_> = all_samples.iter().filter_map(|&n| name.with_samples_per_segment(n)).collect();
+        if with.is_empty() { vec![name] } else { with }
+    };
+    Ok(names.iter().flat_map(with_samples).collect())
 }
 
 impl ReportFiles {
@@ -226,12 +219,9 @@ impl ReportFiles {
 
 /// Where a file is or will be, by whatever links and detours its path leads there.
 fn resolved(path: &Path) -> PathBuf {
-    if let Ok(real) = path.canonicalize() {
-        return real;
-    }
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let real = absolute.parent().and_then(|folder| folder.canonicalize().ok()).zip(absolute.file_name());
-    real.map_or_else(|| absolute.clone(), |(folder, name)| folder.join(name))
+    let beside = || Some(absolute.parent()?.canonicalize().ok()?.join(absolute.file_name()?));
+    path.canonicalize().ok().or_else(beside).unwrap_or(absolute)
 }
 
 /// A device or a pipe keeps nothing that could be replaced.
