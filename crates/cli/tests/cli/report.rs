@@ -282,5 +282,5 @@ fn a_wrong_answer_fails() {
     bytes[72..76].copy_from_slice(&crc.to_le_bytes());
     std::fs::write(sandbox.path().join("fog.vdfq"), &bytes).unwrap();
     let args = ["report", "queries", "--queries", "fog.vdfq", "--json", "r.json", "-q"];
-    sandbox.fails(&args, 1, &["WRONG ANSWER: none says", "of query 3, from ["]);
+    sandbox.fails(&[&args[..], &TINY[..4]].concat(), 1, &["WRONG ANSWER: none says", "of query 3, from ["]);
 }
