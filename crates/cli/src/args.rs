@@ -1,5 +1,8 @@
 //! The command line as typed.
 
+mod convergence;
+mod report;
+
 use std::{path::PathBuf, str::FromStr};
 
 use clap::{
@@ -10,6 +13,11 @@ use vdf_image::metrics::PIXELS_PER_DEGREE;
 use vdf_render::Integrator;
 use vdf_scene::PixelRect;
 use vdf_visibility::{Method, UnknownMethod};
+
+pub(crate) use convergence::ReportConvergenceArgs;
+pub(crate) use report::{
+    ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportScalingArgs, ReportThesisArgs,
+};
 
 /// Render fog, smoke and haze; prove most shadow segments unoccluded instead of tracing them.
 #[derive(Debug, Parser)]
@@ -26,6 +34,7 @@ pub(crate) enum Command {
     Verify(VerifyArgs),
     Voxelize(VoxelizeArgs),
     Compare(CompareArgs),
+    Report(ReportArgs),
 }
 
 /// Render a scene to an EXR and a PNG.

@@ -33,5 +33,6 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Verify(a) => commands::verify::run(a),
         Command::Voxelize(a) => commands::voxelize::run(a),
         Command::Compare(a) => commands::compare::run(a),
+        Command::Report(a) => commands::report::run(&a.command),
     }
 }

@@ -24,21 +24,6 @@ pub(crate) struct Reporter {
     interrupted: Arc<AtomicBool>,
 }
 
-/// A part of a larger work, which counts its parts itself: it can be stopped, and that is all.
-pub(crate) struct Part<'a>(pub(crate) &'a Reporter);
-
-impl Progress for Part<'_> {
-    fn phase(&self, _: &str) {}
-
-    fn work_total(&self, _: u64) {}
-
-    fn work_done(&self, _: u64) {}
-
-    fn cancelled(&self) -> bool {
-        self.0.interrupted()
-    }
-}
-
 /// What the lines are about.
 struct Lines {
     phase: String,

@@ -16,7 +16,9 @@
 //! ```
 
 mod error;
+mod progress;
 pub mod queries;
+pub mod report;
 pub mod verify;
 mod voxels;
 

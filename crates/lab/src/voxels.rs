@@ -26,11 +26,11 @@ pub struct SceneVoxels {
 }
 
 impl SceneVoxels {
-    /// Voxelizes `scene` and asks the method about every voxel and point emitter. The method `none` has no voxels of its own; those of the
-    /// default method stand for it, without neighbourhoods.
+    /// Voxelizes `scene` and asks the method about every voxel and point emitter. The method `none` has no voxels of
+    /// its own; those of the default method stand for it, without neighbourhoods.
     ///
-    /// # Errors
-    /// If the voxel size or the number of threads is not usable, the grid exceeds `options.max_voxels`, or `progress` asks to stop.
+    /// # Errors If the voxel size or the number of threads is not usable, the grid exceeds `options.max_voxels`, or
+    /// `progress` asks to stop.
     pub fn build(
         scene: impl Into<Arc<Scene>>,
         options: &PrepareOptions,

@@ -83,7 +83,8 @@ impl BuildReport {
     /// `T_build` in seconds (Sec. 2.6 in \[Houska2013\]).
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        self.parts.iter().map(|p| p.seconds).sum()
+        // An empty sum of floating-point numbers would be −0, which is printed with its sign.
+        self.parts.iter().fold(0.0, |sum, p| sum + p.seconds)
     }
 
     /// The memory of all that was built, in bytes.
@@ -173,5 +174,15 @@ impl LightBuilder<'_> {
             }
             PointProver::Extended => LightProver::Extended(ExtendedNeighbourhood::new(self.occupied, light.into())),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_takes_no_time() {
+        assert_eq!(format!("{:.1}", BuildReport::default().seconds()), "0.0");
     }
 }

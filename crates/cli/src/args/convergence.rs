@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use vdf_render::Integrator;
 
-use super::{IntegratorName, Methods, ReportFiles, parse_define};
+use super::{Methods, ReportFiles, integrator_parser, parse_define, report::about};
 
-/// Measure speed against error: how far from a converged reference a render is after so much time, per method.
 #[derive(Debug, Args)]
 #[command(
+    about = about("convergence"),
     after_help = "Each integrator has a reference of its own, for they converge to different images: volpath to all scattering,
 raymarch to single scattering in the medium. A reference is two independent halves; their difference bounds its
 own error, which is subtracted, and no error is claimed that is not four times as large. References are kept in
@@ -35,8 +36,8 @@ pub(crate) struct ReportConvergenceArgs {
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
     /// Integrators, separated by commas
-    #[arg(long, value_enum, default_value = "volpath,raymarch", value_delimiter = ',')]
-    pub(crate) integrator: Vec<IntegratorName>,
+    #[arg(long, value_name = "INTEGRATOR", default_value = "volpath,raymarch", value_delimiter = ',', value_parser = integrator_parser())]
+    pub(crate) integrator: Vec<Integrator>,
     /// Samples on each path segment, for raymarch only; several are separated by commas [default: 7]
     #[arg(long, value_name = "N", value_delimiter = ',')]
     pub(crate) samples_per_segment: Vec<u32>,

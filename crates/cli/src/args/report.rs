@@ -2,9 +2,19 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{
+    Args, Subcommand,
+    builder::{PossibleValuesParser, TypedValueParser as _},
+};
+use vdf_lab::report::{REPORTS, scaling::SweepKind, thesis::ThesisOptions};
+use vdf_render::Integrator;
 
-use super::{IntegratorName, Methods, ReportConvergenceArgs, parse_count, parse_define};
+use super::{Methods, ReportConvergenceArgs, integrator_parser, parse_count, parse_define};
+
+/// What the report does, as its library says it.
+pub(super) fn about(name: &str) -> &'static str {
+    REPORTS.iter().find(|r| r.name == name).map_or("", |r| r.about)
+}
 
 /// Measure, and write what was measured as a page, as CSV or as JSON.
 #[derive(Debug, Args)]
@@ -26,9 +36,9 @@ pub(crate) enum ReportCommand {
     Thesis(ReportThesisArgs),
 }
 
-/// Replay the visibility queries of a render, per method: what a query and a proof cost, and what that gains.
 #[derive(Debug, Args)]
 #[command(
+    about = about("queries"),
     after_help = "Every answer of every method is compared with that of the hierarchy before anything is timed. Times are
 nanoseconds a query, medians of passes over the whole stream that take turns; no timer runs inside a pass.
 
@@ -60,8 +70,8 @@ pub(crate) struct ReportQueriesArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["integrator", "samples_per_segment", "spp", "seed", "max_queries"])]
     pub(crate) queries: Option<PathBuf>,
     /// Whose queries to record
-    #[arg(long, value_enum, default_value_t = IntegratorName::Volpath)]
-    pub(crate) integrator: IntegratorName,
+    #[arg(long, value_name = "INTEGRATOR", default_value = "volpath", value_parser = integrator_parser())]
+    pub(crate) integrator: Integrator,
     /// Samples on each path segment, for raymarch only [default: 7]
     #[arg(long, value_name = "N")]
     pub(crate) samples_per_segment: Option<u32>,
@@ -90,9 +100,9 @@ pub(crate) struct ReportQueriesArgs {
     pub(crate) files: ReportFiles,
 }
 
-/// Measure how costs grow with triangles, voxels, lights and threads, and fit exponents.
 #[derive(Debug, Args)]
 #[command(
+    about = about("scaling"),
     after_help = "Each sweep doubles one thing (refined: times four) and leaves the others alone. Exponents are slopes of a least-squares line through the
 logarithms; the slope of the last step is beside them, since small sizes are not asymptotic.
 
@@ -115,8 +125,8 @@ Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2
 pub(crate) struct ReportScalingArgs {
     /// Sweeps, separated by commas
     #[arg(long, value_name = "SWEEP", value_delimiter = ',', default_value = "triangles,refined,voxels,lights,threads",
-        value_parser = ["triangles", "refined", "voxels", "lights", "threads"])]
-    pub(crate) only: Vec<String>,
+        value_parser = PossibleValuesParser::new(SweepKind::ALL.map(SweepKind::name)).try_map(|name| name.parse::<SweepKind>()))]
+    pub(crate) only: Vec<SweepKind>,
     /// Smaller sizes, fewer repetitions
     #[arg(long)]
     pub(crate) quick: bool,
@@ -148,9 +158,9 @@ pub(crate) struct ReportScalingArgs {
     pub(crate) files: ReportFiles,
 }
 
-/// Repeat the measurements of the thesis that the method comes from (chapter 6), each figure beside its own.
 #[derive(Debug, Args)]
 #[command(
+    about = about("thesis"),
     after_help = "Tables 6.1, 6.2, 6.4 to 6.11 and Figure 6.7, for all methods, and the inequality 2.7: the gain that it
 predicts and the gain measured. Images are compared bit by bit between all methods. The times of renders are
 for one thread, as in the thesis, and for all, and scaled to its images of 512 x 512 pixels if these are smaller.
@@ -167,7 +177,7 @@ Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2
 pub(crate) struct ReportThesisArgs {
     /// Scenes, separated by commas; cbox_vol2 and cbox_vol3 are in Tables 6.1 and 6.2 only
     #[arg(long, value_name = "SCENE", value_delimiter = ',', default_value = "cbox_vol2,cbox_vol3,cbox_vol4,cbox_vol6,san-miguel,scape",
-        value_parser = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "san-miguel", "scape"])]
+        value_parser = PossibleValuesParser::new(ThesisOptions::SCENES))]
     pub(crate) scenes: Vec<String>,
     /// Methods, separated by commas
     #[arg(long, default_value = "all", value_name = "all|METHOD", value_delimiter = ',')]

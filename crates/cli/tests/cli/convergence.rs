@@ -202,5 +202,5 @@ fn failures() {
     // A folder of references that cannot be.
     sandbox.write("file", "");
     let args = ["report", "convergence", "--quick", "--cache", "file/references"];
-    sandbox.fails(&args, 1, &["cannot keep references in file/references; name another folder by --cache"]);
+    sandbox.fails(&args, 1, &["cannot keep references in file/references; choose another folder as the cache"]);
 }

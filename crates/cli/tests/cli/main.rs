@@ -3,7 +3,9 @@
 
 mod bad_input;
 mod compare;
+mod convergence;
 mod render;
+mod report;
 mod sandbox;
 mod scenes;
 #[cfg(target_os = "linux")]

@@ -225,6 +225,15 @@ fn failures() {
     sandbox.fails(&["report", "queries", "--voxel", "8,-1"], 2, &["--voxel must be a positive finite number, not -1"]);
     sandbox.fails(&["report", "queries", "--max-queries", "0"], 2, &["--max-queries must be at least 1"]);
     sandbox.fails(&["report", "queries", "--html", "no/x.html"], 1, &["cannot write no/x.html: No such file"]);
+    for (args, part) in [
+        (&["--html", "x", "--csv", "./x"][..], "--csv ./x: --html is that file"),
+        (&["--csv", "x", "--json", "x"], "--json x: --csv is that file"),
+        (&["--queries", "a.vdfq", "--html", "a.vdfq"], "--html a.vdfq: --queries is that file"),
+        (&["--export", "out", "--json", "out/queries.bin"], "--json out/queries.bin: --export is that file"),
+    ] {
+        sandbox.fails(&[&["report", "queries"], args].concat(), 2, &[part, "give another name"]);
+    }
+    sandbox.fails(&["report", "scaling", "--html", "x", "--json", "x"], 2, &["--json x: --html is that file"]);
     sandbox.fails(&["report", "queries", "--queries", "no.vdfq"], 2, &["no.vdfq: No such file or directory"]);
     sandbox.fails(&["report", "queries", "--queries", "a", "--spp", "1"], 2, &["cannot be used with"]);
     sandbox.fails(&["report", "thesis", "--scenes", "moon"], 2, &["moon", "san-miguel"]);
@@ -254,7 +263,7 @@ fn failures() {
     sandbox.fails(
         &["report", "queries", "cbox_vol3", "--queries", "fog.vdfq"],
         2,
-        &["fog.vdfq: recorded in another scene", "name that scene"],
+        &["fog.vdfq: recorded in another scene", "name the scene that it was recorded in"],
     );
     let mut bytes = sandbox.read("fog.vdfq");
     bytes[80] ^= 1;
@@ -273,5 +282,5 @@ fn a_wrong_answer_fails() {
     bytes[72..76].copy_from_slice(&crc.to_le_bytes());
     std::fs::write(sandbox.path().join("fog.vdfq"), &bytes).unwrap();
     let args = ["report", "queries", "--queries", "fog.vdfq", "--json", "r.json", "-q"];
-    sandbox.fails(&args, 1, &["WRONG ANSWER: none says", "of query 3, from ["]);
+    sandbox.fails(&[&args[..], &TINY[..4]].concat(), 1, &["WRONG ANSWER: none says", "of query 3, from ["]);
 }

@@ -1,8 +1,8 @@
 //! Recording the queries of a render.
 //!
-//! Whole paths are kept, each with the same probability, and in the order in which a render of one thread would follow them: so a replay
-//! meets the coherence that a render meets, where one path asks for many points of one ray. Which paths these are depends on a random number of each
-//! path's own; the stream has those with the smallest numbers.
+//! Whole paths are kept, each with the same probability, and in the order in which a render of one thread would follow
+//! them: so a replay meets the coherence that a render meets, where one path asks for many points of one ray. Which
+//! paths these are depends on a random number of each path's own; the stream has those with the smallest numbers.
 
 use std::cell::RefCell;
 
@@ -20,17 +20,19 @@ const PILOT_PATHS: f64 = 256.0;
 /// By how much more is followed than seems needed, so that one round more is seldom needed.
 const MARGIN: f64 = 1.25;
 
-/// The most by which a round follows more paths than the one before: what few paths tell of the queries of all may be far off.
+/// The most by which a round follows more paths than the one before: what few paths tell of the queries of all may be
+/// far off.
 const MAX_GROWTH: f64 = 64.0;
 
 /// More paths than this are not looked through: of each pixel the first samples stand for all.
 const MAX_PATHS: u64 = 1 << 24;
 
-/// Mixed into the seed for the numbers that choose paths, so that these are independent of those that the paths consume.
+/// Mixed into the seed for the numbers that choose paths, so that these are independent of those that the paths
+/// consume.
 const SELECTION: u64 = 0x7175_6572_6965_7321;
 
-/// The visibility queries of a render of `prepared` with `options`: those of as many whole paths as ask at most `max_queries`. They do not
-/// depend on the method. Cost: that of rendering the paths kept.
+/// The visibility queries of a render of `prepared` with `options`: those of as many whole paths as ask at most
+/// `max_queries`. They do not depend on the method. Cost: that of rendering the paths kept.
 ///
 /// # Errors
 /// If an option is not usable, `max_queries` is 0, or `progress` asks to stop.

@@ -1,5 +1,6 @@
-//! Streams in memory and in files. The format, version 2, is described byte by byte in `docs/query-streams.md`: a header of 80 bytes,
-//! and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles that they are about.
+//! Streams in memory and in files. The format, version 2, is described byte by byte in `docs/query-streams.md`: a
+//! header of 80 bytes, and 56 bytes for each query, little-endian, with checksums of both the queries and the triangles
+//! that they are about.
 
 use std::{
     fs::File,
@@ -168,7 +169,7 @@ fn decode(file: &mut impl Read, length: u64) -> Result<QueryStream, String> {
     };
     file.read_exact(&mut header).map_err(read)?;
     if &header[..8] != MAGIC {
-        return Err("not a file of queries; make one with vdf render --record-queries".to_owned());
+        return Err("not a file of queries; record one".to_owned());
     }
     let u32_at = |i: usize| u32::from_le_bytes([header[i], header[i + 1], header[i + 2], header[i + 3]]);
     let u64_at = |i: usize| u64::from(u32_at(i)) | u64::from(u32_at(i + 4)) << 32;
@@ -250,9 +251,10 @@ pub(super) fn triangles_crc32(triangles: &[Triangle]) -> u32 {
     crc.finalize()
 }
 
-/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 2, u32 size of this header 32, u64 number of triangles, u32
-/// CRC-32 of all that follows the header, u32 0; then nine f32 each, the coordinates of three vertices. They are the exact geometry that the answers of a
-/// [`QueryStream`] are about. The file appears whole or not at all.
+/// Writes triangles for other programs, little-endian: `VDFTRIAN`, u32 version 2, u32 size of this header 32, u64
+/// number of triangles, u32 CRC-32 of all that follows the header, u32 0; then nine f32 each, the coordinates of three
+/// vertices. They are the exact geometry that the answers of a [`QueryStream`] are about. The file appears whole or not
+/// at all.
 ///
 /// # Errors
 /// What the system says.

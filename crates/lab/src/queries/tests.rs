@@ -46,7 +46,8 @@ fn all_paths_ask_what_the_render_asks() {
     }
 }
 
-/// A stream with a bound: some of the whole paths of the unbounded one, in its order, the same for any number of threads.
+/// A stream with a bound: some of the whole paths of the unbounded one, in its order, the same for any number of
+/// threads.
 #[test]
 fn a_bounded_stream_is_a_deterministic_part() {
     let prepared = plain("cbox_vol2", "40");
@@ -157,23 +158,40 @@ fn a_replay_measures_all_methods() {
     let options =
         ReplayOptions { voxel_sizes: vec![16.0, 40.0], passes: 2, threads: Some(2), ..ReplayOptions::default() };
     let r = replay(&prepared, &stream, &options, &Quiet).unwrap();
-    assert_eq!((r.queries, r.spatial), (stream.queries.len(), stream.spatial()));
+    let classes: Vec<_> = r.hierarchy.classes.iter().map(|c| (c.kind, c.queries)).collect();
+    let superficial = stream.queries.len() - stream.spatial();
+    assert_eq!(classes, [(QueryKind::Spatial, stream.spatial()), (QueryKind::Superficial, superficial)]);
+    assert_eq!((r.queries, r.p_spatial), (stream.queries.len(), stream.spatial() as f64 / stream.queries.len() as f64));
     assert_eq!(r.methods.len(), 2 * (Method::proving().count()));
-    for t in [r.t_loop, r.hierarchy.t_spatial, r.timer.t_spatial, r.timer.said, r.hierarchy.t_superficial.unwrap()] {
+    // In the order asked for, though they are measured field by field.
+    let order: Vec<_> = r.methods.iter().map(|m| (m.method, m.voxel_size)).collect();
+    let expected = [16.0, 40.0].into_iter().flat_map(|size| Method::proving().map(move |m| (m.name(), size)));
+    assert_eq!(order, expected.collect::<Vec<_>>());
+    let times = r.hierarchy.classes.iter().map(|c| c.time);
+    for t in times.chain([r.t_loop, r.timer.time, r.timer.said]) {
         assert!(0.0 < t.min && t.min <= t.median && t.median <= t.max, "{t:?}");
     }
+    let spatial = r.hierarchy.class(QueryKind::Spatial).unwrap();
+    let other = r.hierarchy.t_other();
+    assert_eq!(other, r.hierarchy.class(QueryKind::Superficial).unwrap().time.median);
+    let mixed = r.p_spatial * r.hierarchy.t_spatial() + (1.0 - r.p_spatial) * other;
+    assert!((r.hierarchy.t_query / mixed - 1.0).abs() < 1e-12);
     for m in &r.methods {
-        assert_eq!(m.p_accelerated_given_spatial, m.proved as f64 / r.spatial as f64);
-        assert_eq!(m.unknown_fraction, 1.0 - m.p_accelerated_given_spatial);
-        assert!(m.p_accelerated_given_spatial <= r.unoccluded_of_spatial, "{} proves more than there is", m.method);
-        assert!(m.proved > 0 && m.t_acc.median > 0.0 && m.t_effective.median > 0.0 && m.bytes > 0 && m.t_build > 0.0);
-        assert_eq!(m.speed_up, m.t_hierarchy.median / m.t_effective.median);
-        assert_eq!(m.pays_from.is_some(), m.speed_up > 1.0);
+        assert!(m.bytes > 0 && m.t_build > 0.0 && m.proofs.len() == 1);
+        let p = m.spatial().unwrap();
+        assert_eq!(p.p_accelerated, p.proved as f64 / spatial.queries as f64);
+        assert_eq!(p.unknown_fraction, 1.0 - p.p_accelerated);
+        assert!(p.proved > 0 && p.proved <= spatial.unoccluded, "{} proves more than there is", m.method);
+        assert!(p.t_acc.median > 0.0 && p.t_effective.median > 0.0);
+        assert_eq!(p.speed_up, p.t_hierarchy.median / p.t_effective.median);
+        assert_eq!(p.pays_from.is_some(), p.speed_up > 1.0);
     }
     let proved = |method: &str, size| {
-        r.methods.iter().find(|m| m.method == method && m.voxel_size == size).map(|m| m.proved).unwrap()
+        let found = r.methods.iter().find(|m| m.method == method && m.voxel_size == size);
+        found.and_then(MethodReplay::spatial).map(|p| p.proved).unwrap()
     };
-    assert!(proved("amr", 16.0) == proved("amr-sn", 16.0) && proved("amr", 16.0) <= proved("amr-xsn", 16.0));
+    let [field, safe, extended] = ["amr", "amr-sn", "amr-xsn"].map(|method| proved(method, 16.0));
+    assert!(field == safe && field <= extended, "{field} {safe} {extended}");
     assert!(proved("amr", 16.0) > proved("ndf", 16.0));
 
     let fails = |options: ReplayOptions, part: &str| {
@@ -198,13 +216,92 @@ fn a_replay_measures_all_methods() {
     assert!(matches!(error, LabError::NoQueries { .. }), "{error}");
 }
 
+/// Fog that only an area light lights.
+pub(crate) fn lamp() -> Scene {
+    let text = r#"<scene version="3.0.0">
+        <integrator type="volpath"/>
+        <sensor type="perspective">
+            <transform name="to_world"><lookat origin="0, 0, 8" target="0, 0, 0" up="0, 1, 0"/></transform>
+            <film type="hdrfilm"><integer name="width" value="12"/><integer name="height" value="12"/></film>
+            <ref id="fog"/>
+        </sensor>
+        <medium type="homogeneous" id="fog"><rgb name="albedo" value="0.9"/><float name="sigma_t" value="0.1"/></medium>
+        <shape type="rectangle">
+            <transform name="to_world"><rotate x="1" angle="90"/><translate y="3"/></transform>
+            <emitter type="area"><rgb name="radiance" value="1"/></emitter>
+        </shape>
+        <shape type="rectangle">
+            <transform name="to_world"><rotate x="1" angle="-90"/><scale value="2"/><translate y="-3"/></transform>
+            <bsdf type="diffuse"/>
+        </shape>
+    </scene>"#;
+    let file = vdf_scene::EmbeddedFile { path: "lamp.xml".into(), text: text.into() };
+    let source = vdf_scene::SceneSource::embedded(file, vec![]);
+    Scene::from_source(&source, &LoadOptions::default()).unwrap()
+}
+
+/// Where only an area light lights fog no query is spatial, but the light's neighbourhood proves some, and a replay
+/// says so.
+#[test]
+fn proofs_towards_area_lights_are_a_class_of_their_own() {
+    let prepared = self::prepared(lamp(), Method::NONE);
+    let options = options(RAYMARCH, 2);
+    let stream = record_queries(&prepared, &options, 5000, &Quiet).unwrap();
+    assert_eq!(stream.spatial(), 0);
+    let methods = ["amr", "amr-xsn"].map(|m| m.parse().unwrap()).to_vec();
+    let replay_options = ReplayOptions { methods, voxel_sizes: vec![0.5], passes: 2, ..ReplayOptions::default() };
+    let r = replay(&prepared, &stream, &replay_options, &Quiet).unwrap();
+    let class = r.hierarchy.class(QueryKind::OnLight).unwrap();
+    assert!(class.queries > 100 && class.unoccluded > 0 && r.p_spatial == 0.0 && r.hierarchy.t_spatial() == 0.0);
+    let of = |i: usize| r.methods[i].proofs_of(QueryKind::OnLight).unwrap();
+    assert!(r.methods.iter().all(|m| m.spatial().is_none()));
+    assert_eq!(of(0).proved, 0, "a field knows nothing of the light's surface");
+    assert!(of(1).proved > 0 && of(1).proved <= class.unoccluded && of(1).t_acc.median > 0.0);
+    // The render counts the same proofs.
+    let options = RenderOptions { spp: Some(3), ..options };
+    let with = PrepareOptions { voxel_size: Some(0.5), ..PrepareOptions::with_method(Method::default()) };
+    let all = record_queries(&prepared, &options, u64::MAX, &Quiet).unwrap();
+    let replayed = replay(&prepared, &all, &replay_options, &Quiet).unwrap();
+    let statistics = prepared.with_options(&with, &Quiet).unwrap().render(&options, &Quiet).unwrap().statistics;
+    let proved = replayed.methods[1].proofs_of(QueryKind::OnLight).unwrap().proved;
+    assert_eq!(proved as u64, statistics.on_light_proved);
+}
+
+/// Of methods that were built, at most those of one field exist at a time: the peak is that of one field, not of all.
+#[test]
+fn fields_are_dropped_before_others_are_built() {
+    // Told by the phases: each group of methods is replayed before the next is built.
+    #[derive(Default)]
+    struct Phases(std::sync::Mutex<Vec<String>>);
+    impl vdf_render::Progress for Phases {
+        fn phase(&self, name: &str) {
+            self.0.lock().unwrap().push(name.to_owned());
+        }
+        fn work_total(&self, _: u64) {}
+        fn work_done(&self, _: u64) {
+            self.0.lock().unwrap().push("step".to_owned());
+        }
+        fn cancelled(&self) -> bool {
+            false
+        }
+    }
+    let prepared = plain("cbox_vol2", "8");
+    let stream = record_queries(&prepared, &options(RAYMARCH, 2), 500, &Quiet).unwrap();
+    let options = ReplayOptions { voxel_sizes: vec![40.0], passes: 1, ..ReplayOptions::default() };
+    let phases = Phases::default();
+    replay(&prepared, &stream, &options, &phases).unwrap();
+    let seen = phases.0.into_inner().unwrap();
+    let group = ["checking", "step", "step", "step", "replaying", "step", "step", "step"];
+    assert_eq!(seen, group.repeat(4));
+}
+
 #[test]
 fn every_single_wrong_answer_is_found() {
     let prepared = self::prepared(scene("cbox_vol2", "12"), "amr-sn".parse().unwrap());
     let stream = record_queries(&prepared, &options(RAYMARCH, 2), 9000, &Quiet).unwrap();
     assert!(stream.queries.len() > 4096, "more than a block");
     let asked = |truth: &[bool]| check(&prepared.visibility(), &stream.queries, truth);
-    assert!(asked(&stream.unoccluded).is_ok_and(|proved| proved > 100));
+    assert!(asked(&stream.unoccluded).is_ok_and(|checked| checked.proved(QueryKind::Spatial) > 100));
     for wrong in (0..stream.queries.len()).step_by(97).chain([4095, 4096, stream.queries.len() - 1]) {
         let mut truth = stream.unoccluded.clone();
         truth[wrong] ^= true;

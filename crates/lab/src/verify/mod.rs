@@ -1,11 +1,11 @@
 //! The soundness run: many segments, hard ones above all, and every proof about them checked.
 //!
-//! *Idea.* A proof is a claim about exact geometry, so it can be held against a test that knows no voxels. Segments are made in
-//! blocks; each method is asked about a whole block; where any method proved something, the hierarchy is asked as well, and a loop
-//! over all triangles as often as that is affordable.
+//! *Idea.* A proof is a claim about exact geometry, so it can be held against a test that knows no voxels. Segments are
+//! made in blocks; each method is asked about a whole block; where any method proved something, the hierarchy is asked
+//! as well, and a loop over all triangles as often as that is affordable.
 //!
-//! First the structures themselves are validated: the occupied voxels against the triangles, the fields and neighbourhoods against the
-//! occupied voxels.
+//! First the structures themselves are validated: the occupied voxels against the triangles, the fields and
+//! neighbourhoods against the occupied voxels.
 //!
 //! *Guarantee.* None, only a bound: see [`Tally::bound`]. What is asked depends on the seed and the scene alone.
 //!
@@ -22,8 +22,8 @@ use std::{array, sync::Arc, time::Instant};
 
 use rayon::prelude::*;
 use vdf_geometry::Bounds;
-use vdf_render::{GridExtent, 
-    PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
+use vdf_render::{
+    GridExtent, PrepareOptions, PreparedScene, Progress, RenderError, check_voxel_size, default_voxel_size, on_threads,
 };
 use vdf_scene::Scene;
 use vdf_visibility::{Answer, Method, Provers, QueryKind, ShadowQuery};
@@ -55,7 +55,8 @@ const CLASSES: usize = SegmentClass::ALL.len();
 pub struct VerifyOptions {
     /// The methods, all asked about the same segments; at least one, and not [`Method::NONE`], which proves nothing.
     pub methods: Vec<Method>,
-    /// Sides of voxels in world units, between which the segments are divided; if empty a 128th of the scene's longest side.
+    /// Sides of voxels in world units, between which the segments are divided; if empty a 128th of the scene's longest
+    /// side.
     pub voxel_sizes: Vec<f64>,
     /// What the voxel grids cover.
     pub grid: GridExtent,
@@ -231,7 +232,8 @@ impl Claimant for Provers {
     fn claim(&self, queries: &[Query], claims: &mut [Claims], bit: u32) {
         for (query, claims) in queries.iter().zip(claims) {
             let (from, to) = (query.segment.p, query.segment.q);
-            // A query towards an emitter may have an answer of its own; the one for any two points has to be right as well.
+            // A query towards an emitter may have an answer of its own; the one for any two points has to be right as
+            // well.
             let of_emitter = query.emitter.map(|emitter| {
                 [QueryKind::Spatial, QueryKind::OnLight]
                     .map(|kind| self.answer(&ShadowQuery { from, to, emitter, kind }))

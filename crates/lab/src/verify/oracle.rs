@@ -3,7 +3,8 @@
 use vdf_geometry::{Bounds, Segment, intersect_exact};
 use vdf_render::World;
 
-/// The loop is run on every segment up to this many triangles; beyond, on a share of the segments such that it costs no more.
+/// The loop is run on every segment up to this many triangles; beyond, on a share of the segments such that it costs no
+/// more.
 const TRIANGLES_PER_SEGMENT: u64 = 256;
 
 /// Of the segments without a proof only one in so many is asked about: they test the hierarchy, not the proofs.

@@ -60,9 +60,9 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// The rule of three: if none of n independent proofs is wrong, the chance of a wrong one, among segments so distributed,
-    /// is below 3/n with 95 % confidence. Here n is the number of proved segments, since proofs of one segment by several methods are
-    /// not independent. `None` without proofs or with a wrong one.
+    /// The rule of three: if none of n independent proofs is wrong, the chance of a wrong one, among segments so
+    /// distributed, is below 3/n with 95 % confidence. Here n is the number of proved segments, since proofs of one
+    /// segment by several methods are not independent. `None` without proofs or with a wrong one.
     #[must_use]
     pub fn bound(&self) -> Option<f64> {
         rule_of_three(self.proved, self.wrong)

@@ -1,8 +1,8 @@
 //! Segments that try to make a proof wrong.
 //!
-//! *Idea.* A wrong proof needs a segment that meets an occluder where the voxels say that none is. Uniform segments hardly
-//! ever come near such a place, so most classes aim: at vertices and edges, along the faces of voxels, at the border of the
-//! grid, one step of the last place beside all of these.
+//! *Idea.* A wrong proof needs a segment that meets an occluder where the voxels say that none is. Uniform segments
+//! hardly ever come near such a place, so most classes aim: at vertices and edges, along the faces of voxels, at the
+//! border of the grid, one step of the last place beside all of these.
 //!
 //! *Definition.* Segment `index` of a class is a function of (seed, grid number, class, index), whatever the number of
 //! threads. In all classes but the first two, half of the segments end on a light if there is one: those are what
@@ -32,8 +32,8 @@ pub enum SegmentClass {
     Surface,
     /// Ends on faces, edges and corners of voxels, and segments along those.
     Lattice,
-    /// From where an occluder comes close to a corner, an edge or a face of a voxel, across the occluder: only the dilation of
-    /// the occupied voxels keeps a proof from being wrong there.
+    /// From where an occluder comes close to a corner, an edge or a face of a voxel, across the occluder: only the
+    /// dilation of the occupied voxels keeps a proof from being wrong there.
     Corner,
     /// Parallel to an axis, with zeros of either sign.
     Axis,

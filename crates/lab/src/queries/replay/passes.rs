@@ -1,0 +1,87 @@
+//! Passes over queries: one that checks every answer, and those that are timed.
+
+use std::{hint::black_box, time::Instant};
+
+use rayon::prelude::*;
+use vdf_visibility::{Answer, Counters, Provers, QueryKind, ShadowQuery, Visibility};
+
+/// How many queries were proved when every answer was compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Checked(Counters);
+
+impl Checked {
+    /// Queries of a class that were proved.
+    pub(crate) fn proved(&self, kind: QueryKind) -> usize {
+        let n = match kind {
+            QueryKind::Spatial => self.0.proved,
+            QueryKind::OnLight => self.0.on_light_proved,
+            QueryKind::Superficial => 0,
+        };
+        n as usize
+    }
+}
+
+/// Compares every answer with the truth: how many were proved, or the index of the first query that is answered
+/// wrongly.
+pub(crate) fn check(visibility: &Visibility<'_>, queries: &[ShadowQuery], truth: &[bool]) -> Result<Checked, usize> {
+    const BLOCK: usize = 4096;
+    let answers = queries.par_chunks(BLOCK).zip(truth.par_chunks(BLOCK)).enumerate();
+    let blocks: Vec<Counters> = answers
+        .map(|(number, (queries, truth))| {
+            let mut counters = Counters::default();
+            let differs = queries.iter().zip(truth).position(|(q, &t)| visibility.unoccluded(q, &mut counters) != t);
+            differs.map_or(Ok(counters), |i| Err(number * BLOCK + i))
+        })
+        .collect::<Result<_, usize>>()?;
+    let mut all = Counters::default();
+    blocks.into_iter().for_each(|counters| all += counters);
+    Ok(Checked(all))
+}
+
+/// One pass over queries that asks only for proofs: its seconds, and how many there are.
+pub(super) fn proof_pass(provers: &Provers, queries: &[ShadowQuery]) -> (f64, usize) {
+    let start = Instant::now();
+    let mut proved = 0;
+    for q in queries {
+        proved += usize::from(provers.answer(black_box(q)) != Answer::Unknown);
+    }
+    (start.elapsed().as_secs_f64(), proved)
+}
+
+/// One pass over queries as a render asks them: its seconds, and how many are unoccluded.
+pub(super) fn query_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery]) -> (f64, usize) {
+    let start = Instant::now();
+    let mut counters = Counters::default();
+    let mut unoccluded = 0;
+    for q in queries {
+        unoccluded += usize::from(visibility.unoccluded(black_box(q), &mut counters));
+    }
+    black_box(counters);
+    (start.elapsed().as_secs_f64(), unoccluded)
+}
+
+/// A pass of the hierarchy with a timer around each query: as [`query_pass`], and the sum of what the timers say.
+pub(super) fn timer_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery]) -> ((f64, usize), f64) {
+    let start = Instant::now();
+    let mut counters = Counters::default();
+    let (mut unoccluded, mut said) = (0, 0.0);
+    for q in queries {
+        let start = Instant::now();
+        unoccluded += usize::from(visibility.unoccluded(black_box(q), &mut counters));
+        said += start.elapsed().as_secs_f64();
+    }
+    black_box(counters);
+    ((start.elapsed().as_secs_f64(), unoccluded), said)
+}
+
+/// Nanoseconds a query to read the stream and nothing else.
+pub(super) fn empty_pass(queries: &[ShadowQuery]) -> f64 {
+    let start = Instant::now();
+    let mut sum = glam::DVec3::ZERO;
+    for q in queries {
+        let q = black_box(q);
+        sum += q.from + q.to;
+    }
+    black_box(sum);
+    1e9 * start.elapsed().as_secs_f64() / queries.len() as f64
+}
