@@ -4,7 +4,7 @@ mod common;
 
 use common::{Options, all_methods, builtin, options, rendered};
 use vdf::{
-    render::{Integrator, TransmittanceEstimator},
+    render::{Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions, TransmittanceEstimator},
     scene::{PixelRect, Rgb, Scene},
     visibility::Method,
 };
@@ -130,6 +130,22 @@ fn a_crop_is_a_part_of_the_whole() {
         }
         assert_eq!(bits(&part.pixels), bits(&expected), "{crop:?}");
     }
+}
+
+/// However the samples of the pixels are divided and in whatever order the parts arrive.
+#[test]
+fn an_image_is_the_sum_of_its_parts() {
+    let scene = builtin("cbox_vol2", &[("width", "12"), ("height", "9")]);
+    let prepared = PreparedScene::new(scene, &PrepareOptions::default(), &Quiet).expect("a sound scene");
+    let o = RenderOptions { spp: Some(11), ..RenderOptions::default() };
+    let whole = prepared.render(&o, &Quiet).expect("usable options").image;
+    let part = |samples| prepared.render_samples(&o, samples, &Quiet).expect("usable options");
+    let mut film = part(3..8);
+    film.merge(part(8..11)).expect("the same render");
+    film.merge(part(0..3)).expect("the same render");
+    let image = film.develop().expect("all samples");
+    assert!(bits(&image.pixels) == bits(&whole.pixels));
+    assert_eq!((image.origin, image.full_size), (whole.origin, whole.full_size));
 }
 
 #[test]

@@ -38,7 +38,11 @@ fn length(s: &Segment) -> Big {
 }
 
 fn fog(sigma_t: f64, boundaries: &[Boundary]) -> Media {
-    Media::new(&[Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic }], boundaries, boundaries.is_empty().then_some(FOG))
+    Media::new(
+        &[Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic }],
+        boundaries,
+        boundaries.is_empty().then_some(FOG),
+    )
 }
 
 const FOG: MediumId = MediumId(0);

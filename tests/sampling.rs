@@ -175,7 +175,9 @@ fn short_flights_are_flights() {
         let tau = -(-u.next_1d()).ln_1p();
         if let Some(flight) = media.short_flight(&segment, medium, tau) {
             found += 1;
-            let FreeFlight::Collision { t, medium: there, .. } = media.free_flight(&segment, &media.regions_at(segment.p), tau) else {
+            let FreeFlight::Collision { t, medium: there, .. } =
+                media.free_flight(&segment, &media.regions_at(segment.p), tau)
+            else {
                 panic!("{segment:?}: no collision")
             };
             assert_eq!(there, medium);

@@ -138,7 +138,9 @@ fn of_segments_is_that_of_clipping_to_slabs() {
             if let Some(medium) = start
                 && let Some(flight) = media.short_flight(&segment, medium, depth)
             {
-                let FreeFlight::Collision { t, medium: there, .. } = media.free_flight(&segment, &media.regions_at(segment.p), depth) else {
+                let FreeFlight::Collision { t, medium: there, .. } =
+                    media.free_flight(&segment, &media.regions_at(segment.p), depth)
+                else {
                     panic!("{i}: a short flight that passes, {segment:?}");
                 };
                 assert!(there == medium && segment.at(t).distance(flight.q) <= 1e-12, "{i}: {flight:?} but {t}");

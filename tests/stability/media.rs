@@ -260,7 +260,11 @@ fn case_43_intervals_without_length() {
         let media = Media::new(&[medium(1.0)], &[slab], None);
         let tau = media.optical_depth(&s, &media.regions_at(s.p));
         assert!(tau <= 1.1e-8, "a slab of {thickness} has the optical depth {tau}");
-        assert_eq!(media.free_flight(&s, &media.regions_at(s.p), 1.0), FreeFlight::Passed(RegionSet::default()), "a slab of {thickness}");
+        assert_eq!(
+            media.free_flight(&s, &media.regions_at(s.p), 1.0),
+            FreeFlight::Passed(RegionSet::default()),
+            "a slab of {thickness}"
+        );
     }
     let unit = closed(Vec3::ZERO, Vec3::ONE);
     let media = Media::new(&[medium(1.0)], std::slice::from_ref(&unit), None);

@@ -31,7 +31,11 @@ impl Camera {
         let p = s.world_from_camera.transform_point3(local * s.near_clip);
         let direction = s.world_from_camera.transform_vector3(local).normalize();
         // A plane beyond all of the scene clips nothing; squares of its distance would overflow.
-        let q = if s.far_clip < reach { s.world_from_camera.transform_point3(local * s.far_clip) } else { p + direction * reach };
+        let q = if s.far_clip < reach {
+            s.world_from_camera.transform_point3(local * s.far_clip)
+        } else {
+            p + direction * reach
+        };
         (Segment::new(p, q), direction)
     }
 

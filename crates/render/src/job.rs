@@ -6,9 +6,7 @@ use vdf_scene::{PixelRect, ReconstructionFilter, Rgb};
 use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
 use crate::{
-    Camera, Integrator, PreparedScene, Progress, RenderOptions, Sampler,
-    film::sample_filter,
-    integrator::Tracer,
+    Camera, Integrator, PreparedScene, Progress, RenderOptions, Sampler, filter::sample_filter, integrator::Tracer,
 };
 
 /// Side of a tile in pixels. Only progress sees tiles.
@@ -107,11 +105,7 @@ impl<'a> Job<'a> {
         self.tracer_with(self.prepared.visibility().recorded(recorder), progress)
     }
 
-    fn tracer_with<R: Recorder>(
-        &self,
-        visibility: Visibility<'a, R>,
-        progress: &'a dyn Progress,
-    ) -> PathTracer<'a, R> {
+    fn tracer_with<R: Recorder>(&self, visibility: Visibility<'a, R>, progress: &'a dyn Progress) -> PathTracer<'a, R> {
         let scene = self.prepared.scene();
         PathTracer {
             tracer: Tracer {
@@ -131,7 +125,10 @@ impl<'a> Job<'a> {
 
 impl<R> std::fmt::Debug for PathTracer<'_, R> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("PathTracer").field("integrator", &self.integrator).field("seed", &self.seed).finish_non_exhaustive()
+        f.debug_struct("PathTracer")
+            .field("integrator", &self.integrator)
+            .field("seed", &self.seed)
+            .finish_non_exhaustive()
     }
 }
 

@@ -30,6 +30,7 @@ mod camera;
 mod chi_squared;
 mod error;
 mod film;
+mod filter;
 mod frame;
 mod integrator;
 mod job;
@@ -47,7 +48,8 @@ mod world;
 
 pub use camera::Camera;
 pub use error::RenderError;
-pub use film::sample_filter;
+pub use film::{Film, FilmError, FilmOrigin};
+pub use filter::sample_filter;
 pub use integrator::{Integrator, UnknownIntegrator};
 pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};

@@ -1,13 +1,16 @@
 //! A scene made ready to be rendered: its world, its hierarchy and the provers of a method, which belong together.
 
-use std::{sync::Arc, time::Instant};
+use std::{ops::Range, sync::Arc, time::Instant};
 
 use vdf_geometry::Bounds;
 use vdf_scene::Scene;
 use vdf_visibility::{BuildReport, Method, ProverOptions, Provers, Visibility};
 
 use crate::{
-    PrepareOptions, Progress, RenderError, RenderOptions, Rendering, World, job::Job, light_shapes, render::render,
+    Film, PrepareOptions, Progress, RenderError, RenderOptions, Rendering, World,
+    job::Job,
+    light_shapes,
+    render::{render, render_film},
     threads::on_threads,
 };
 
@@ -83,6 +86,24 @@ impl PreparedScene {
     pub fn render(&self, options: &RenderOptions, progress: &dyn Progress) -> Result<Rendering, RenderError> {
         let job = self.job(options)?;
         on_threads(options.threads, || render(&job, progress))
+    }
+
+    /// Renders the samples `samples` of every pixel, of whatever number, to a film that can be merged with those of other samples.
+    /// Once all are there the image has the bytes that [`PreparedScene::render`] gives it.
+    ///
+    /// # Errors
+    /// If an option is not usable or there is no sample, or `progress` asks to stop.
+    pub fn render_samples(
+        &self,
+        options: &RenderOptions,
+        samples: Range<u32>,
+        progress: &dyn Progress,
+    ) -> Result<Film, RenderError> {
+        if samples.is_empty() {
+            return Err(RenderError::option("samples", "must be at least one"));
+        }
+        let job = self.job(options)?;
+        on_threads(options.threads, || Ok(render_film(&job, samples, progress)?.0))
     }
 
     /// The render of these options, to be followed path by path.

@@ -1,16 +1,20 @@
-//! A whole render, tile by tile over all threads.
+//! A whole render, tile by tile over all threads, or some samples of it.
 //!
-//! Every pixel is the mean of its own samples, summed in the order of their numbers, and every random number is a function of (seed, pixel,
-//! sample, dimension). So the image does not depend on threads, tiles, crop or method.
+//! Every random number is a function of (seed, pixel, sample, dimension), and the samples of a pixel are summed in a fixed tree (`film.rs`).
+//! So the image does not depend on threads, tiles, crop or method, nor on how its samples are divided.
 
-use std::time::Instant;
+use std::{ops::Range, time::Instant};
 
 use rayon::prelude::*;
 use vdf_image::Image;
 use vdf_scene::{PixelRect, Rgb};
-use vdf_visibility::Counters;
+use vdf_visibility::{Counters, NoRecorder};
 
-use crate::{Progress, RenderError, Statistics, job::Job};
+use crate::{
+    Film, FilmOrigin, Progress, RenderError, Statistics,
+    film::PixelSum,
+    job::{Job, PathTracer},
+};
 
 /// Samples of one pixel between two looks whether to stop: a tile, or even a pixel, may take minutes.
 const SAMPLES_PER_LOOK: u32 = 64;
@@ -55,31 +59,91 @@ pub(crate) fn render<'a>(job: &Job<'a>, progress: &'a dyn Progress) -> Result<Re
     Ok(Rendering { image, statistics })
 }
 
-fn render_tile<'a>(job: &Job<'a>, tile: PixelRect, progress: &'a dyn Progress) -> Result<(Vec<Rgb>, Counters), RenderError> {
+fn render_tile<'a>(
+    job: &Job<'a>,
+    tile: PixelRect,
+    progress: &'a dyn Progress,
+) -> Result<(Vec<Rgb>, Counters), RenderError> {
     let tracer = job.tracer(progress);
     let mut counters = Counters::default();
-    let pixels = (tile.y0..tile.y1)
-        .flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y)))
-        .map(|(x, y)| {
-            let mut sum = glam::DVec3::ZERO;
-            for sample in 0..job.spp() {
-                if sample % SAMPLES_PER_LOOK == 0 && progress.cancelled() {
-                    return Err(RenderError::Cancelled);
-                }
-                let radiance = tracer.sample(x, y, sample, &mut counters);
-                counters.paths += 1;
-                if radiance.is_finite() && radiance.min_element() >= 0.0 {
-                    sum += radiance.as_dvec3();
-                } else {
-                    counters.refused += 1;
-                }
-            }
-            // The last path may have stopped on its way.
-            if progress.cancelled() {
-                return Err(RenderError::Cancelled);
-            }
-            Ok((sum / f64::from(job.spp())).as_vec3())
+    let n = f64::from(job.spp());
+    let pixels = pixels(tile)
+        .map(|pixel| {
+            let sum = sum_pixel(&tracer, pixel, 0..job.spp(), progress, &mut counters)?;
+            Ok((sum.total() / n).as_vec3())
         })
         .collect::<Result<_, RenderError>>()?;
     Ok((pixels, counters))
+}
+
+/// Some samples of every pixel, on the current pool of threads.
+pub(crate) fn render_film<'a>(
+    job: &Job<'a>,
+    samples: Range<u32>,
+    progress: &'a dyn Progress,
+) -> Result<(Film, Counters), RenderError> {
+    progress.phase("rendering");
+    let scene = job.prepared().scene();
+    let (crop, [width, height]) = (job.crop(), job.size());
+    progress.work_total(u64::from(width) * u64::from(height));
+    let rows: Vec<(Vec<PixelSum>, Counters)> = (crop.y0..crop.y1)
+        .into_par_iter()
+        .map(|y| {
+            let tracer = job.tracer(progress);
+            let mut counters = Counters::default();
+            let row = PixelRect { y0: y, y1: y + 1, ..crop };
+            let sums = pixels(row)
+                .map(|pixel| sum_pixel(&tracer, pixel, samples.clone(), progress, &mut counters))
+                .collect::<Result<_, RenderError>>()?;
+            progress.work_done(u64::from(width));
+            Ok((sums, counters))
+        })
+        .collect::<Result<_, RenderError>>()?;
+    let mut film = Film::new(FilmOrigin {
+        scene: scene.checksum(),
+        integrator: job.options().integrator,
+        transmittance: job.options().transmittance.name(),
+        seed: job.seed(),
+        full_size: [scene.film.width, scene.film.height],
+        crop,
+    });
+    let mut counters = Counters::default();
+    let count = width as usize * height as usize;
+    for (row, (sums, of_row)) in rows.into_iter().enumerate() {
+        counters += of_row;
+        for (x, sum) in sums.iter().enumerate() {
+            film.set(row * width as usize + x, count, sum);
+        }
+    }
+    Ok((film, counters))
+}
+
+/// The pixels of a rectangle, row by row.
+fn pixels(r: PixelRect) -> impl Iterator<Item = (u32, u32)> {
+    (r.y0..r.y1).flat_map(move |y| (r.x0..r.x1).map(move |x| (x, y)))
+}
+
+fn sum_pixel(
+    tracer: &PathTracer<'_, NoRecorder>,
+    (x, y): (u32, u32),
+    samples: Range<u32>,
+    progress: &dyn Progress,
+    counters: &mut Counters,
+) -> Result<PixelSum, RenderError> {
+    let mut sum = PixelSum::default();
+    for sample in samples {
+        if sample % SAMPLES_PER_LOOK == 0 && progress.cancelled() {
+            return Err(RenderError::Cancelled);
+        }
+        let radiance = tracer.sample(x, y, sample, counters);
+        counters.paths += 1;
+        if radiance.is_finite() && radiance.min_element() >= 0.0 {
+            sum.add(sample, radiance.as_dvec3());
+        } else {
+            counters.refused += 1;
+            sum.add(sample, glam::DVec3::ZERO);
+        }
+    }
+    // The last path may have stopped on its way.
+    if progress.cancelled() { Err(RenderError::Cancelled) } else { Ok(sum) }
 }

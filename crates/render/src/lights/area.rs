@@ -35,13 +35,7 @@ impl AreaLight {
 
     /// A sample of the light as seen from `from`. `choices` is the number of emitters of which this one was drawn.
     #[inline]
-    pub(super) fn sample(
-        &self,
-        emitter: usize,
-        from: DVec3,
-        u: [f64; 2],
-        choices: f64,
-    ) -> Option<LightSample> {
+    pub(super) fn sample(&self, emitter: usize, from: DVec3, u: [f64; 2], choices: f64) -> Option<LightSample> {
         // Nothing can be sampled on an emitter without area.
         if self.area() <= 0.0 {
             return None;

@@ -18,12 +18,12 @@ use smallvec::SmallVec;
 use vdf_geometry::Segment;
 use vdf_scene::{Boundary, Medium, MediumId, Scene};
 
-use self::{intervals::DepthLeft, regions::Regions};
 pub use self::{
     homogeneous::Homogeneous,
     intervals::{MediumInterval, MediumIntervals},
     regions::RegionSet,
 };
+use self::{intervals::DepthLeft, regions::Regions};
 
 /// The media of a scene and the regions that they fill, prepared for walks along segments.
 #[derive(Debug)]
@@ -182,7 +182,14 @@ impl Media {
             ControlFlow::Continue(regions) => regions,
             ControlFlow::Break(never) => match never {},
         };
-        MediumIntervals { media: self, segment: *segment, length: segment.length(), start: start.clone(), intervals, end }
+        MediumIntervals {
+            media: self,
+            segment: *segment,
+            length: segment.length(),
+            start: start.clone(),
+            intervals,
+            end,
+        }
     }
 
     /// The path of a free flight of optical depth `tau` that starts in `medium`, if it ends in this medium before the segment does and

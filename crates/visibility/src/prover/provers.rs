@@ -7,8 +7,9 @@ use vdf_voxel::{Span, VoxelGrid, VoxelSet};
 use super::{Answer, DistanceField, FieldProver, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
 
-/// What the neighbourhood of a point light at `to`, in the grid, says of a segment. One that comes from outside is clipped to the grid: its
-/// part inside lies in the cuboid of the voxel where it enters and that of the light, outside of which there is nothing to be met.
+/// What the neighbourhood of a point light at `to`, in the grid, says of a segment. One that comes from outside is clipped to the grid: along
+/// each axis its part inside lies between the voxel where it enters, which is found by rounding outwards, and the light's own. So it lies in
+/// the cuboid of the two, and outside of the grid there is nothing to be met.
 #[inline]
 fn by_neighbourhood<N: Neighbourhood>(grid: &VoxelGrid, neighbourhood: &N, from: DVec3, to: DVec3) -> Answer {
     if let Some(voxel) = grid.voxel_containing(from) {
@@ -16,8 +17,7 @@ fn by_neighbourhood<N: Neighbourhood>(grid: &VoxelGrid, neighbourhood: &N, from:
     }
     Answer::unoccluded_if(match grid.voxel_span(from, to) {
         Span::Outside => true,
-        // Clipping moves the voxels apart where an end is on a face by rounding; then the light's may not be its own.
-        Span::Inside(entry, light) => grid.voxel_containing(to) == Some(light) && neighbourhood.proves(entry),
+        Span::Inside(entry, _) => neighbourhood.proves(entry),
     })
 }
 
