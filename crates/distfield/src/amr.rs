@@ -58,11 +58,16 @@ impl Amr {
         Self { resolution, distances }
     }
 
-    /// The distance to the nearest occupied voxel in an octant, at most 255. The voxel must be one of the grid's.
-    /// Bits 0, 1 and 2 of `octant` are set where it extends towards smaller i, j and k.
+    /// The distance to the nearest occupied voxel in an octant, in voxels, at most 255; 0 for a voxel that the grid does not have.
+    /// Bits 0, 1 and 2 of `octant`, which is below 8, are set where it extends towards smaller i, j and k.
     #[must_use]
-    #[inline]
     pub fn distance(&self, octant: usize, voxel: Voxel) -> u8 {
+        if self.resolution.contains(voxel) { self.at(octant, voxel) } else { 0 }
+    }
+
+    /// [`Self::distance`] of one of the grid's voxels.
+    #[inline]
+    fn at(&self, octant: usize, voxel: Voxel) -> u8 {
         debug_assert!(octant < 8 && self.resolution.contains(voxel));
         let index = octant * self.resolution.voxel_count() + self.resolution.linear_index(voxel);
         self.distances.get(index).copied().unwrap_or(0)
@@ -72,9 +77,9 @@ impl Amr {
     #[inline(never)]
     fn proves_tie(&self, a: Voxel, b: Voxel, ties: usize, distance: u32) -> bool {
         let octant = octant_of(a, b);
-        (0..8).filter(|other| (other ^ octant) & !ties == 0).any(|other| {
-            distance < u32::from(self.distance(other, a)) || distance < u32::from(self.distance(other ^ 7, b))
-        })
+        (0..8)
+            .filter(|other| (other ^ octant) & !ties == 0)
+            .any(|other| distance < u32::from(self.at(other, a)) || distance < u32::from(self.at(other ^ 7, b)))
     }
 }
 
@@ -83,7 +88,7 @@ impl SafeZones for Amr {
     fn proves(&self, a: Voxel, b: Voxel) -> bool {
         let distance = chessboard_distance(a, b);
         let octant = octant_of(a, b);
-        if distance < u32::from(self.distance(octant, a)) || distance < u32::from(self.distance(octant ^ 7, b)) {
+        if distance < u32::from(self.at(octant, a)) || distance < u32::from(self.at(octant ^ 7, b)) {
             return true;
         }
         let ties = number(a.i == b.i, a.j == b.j, a.k == b.k);
@@ -128,7 +133,7 @@ fn number(x: bool, y: bool, z: bool) -> usize {
 
 /// Fills one octant's plane, beginning at the corner of the grid that the octant points to.
 fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
-    let Resolution { x, y, z } = occupied.resolution();
+    let [x, y, z] = occupied.resolution().sides();
     let width = x as usize;
     let (ways, ahead) = if octant & MINUS_X == 0 { (Ways::Plus, 2) } else { (Ways::Minus, 0) };
     // The least of the two finished rows ahead on y, in this slice and in the one before.

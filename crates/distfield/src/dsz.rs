@@ -63,18 +63,20 @@ impl Dsz {
     }
 
     /// H: the Manhattan distance to the nearest occupied voxel that is not behind `voxel` as seen in the direction
-    /// of a face, at most 255. Faces 0 to 5 look towards x+, x−, y+, y−, z+, z−. The voxel must be one of the grid's.
+    /// of a face, in voxels, at most 255. Faces 0 to 5 look towards x+, x−, y+, y−, z+, z−. 0 for a voxel that the grid does not have.
     #[must_use]
-    #[inline]
     pub fn half_space_distance(&self, face: usize, voxel: Voxel) -> u8 {
-        debug_assert!(face < 6 && self.resolution.contains(voxel));
-        self.plane_value(face, self.resolution.linear_index(voxel))
+        debug_assert!(face < 6);
+        if self.resolution.contains(voxel) { self.plane_value(face, self.resolution.linear_index(voxel)) } else { 0 }
     }
 
     /// dist of Def. 11: the Manhattan distance to the nearest occupied voxel strictly beyond a face, at most 256. Faces as in
-    /// [`Dsz::half_space_distance`]. The voxel must be one of the grid's; here it does not matter whether it is occupied.
+    /// [`Dsz::half_space_distance`]. Here it does not matter whether the voxel is occupied. 0 for one that the grid does not have.
     #[must_use]
     pub fn distance(&self, face: usize, voxel: Voxel) -> u16 {
+        if !self.resolution.contains(voxel) {
+            return 0;
+        }
         let beyond = validate::neighbour(self.resolution, voxel, FACE_STEPS[face]);
         1 + beyond.map_or(u16::from(u8::MAX), |next| self.half_space_distance(face, next).into())
     }
@@ -88,7 +90,7 @@ impl Dsz {
     #[inline]
     fn reaches(&self, a: Voxel, b: Voxel, distance: u32) -> bool {
         let index = self.resolution.linear_index(a);
-        let row = self.resolution.x as usize;
+        let row = self.resolution.x() as usize;
         // d_Man < 1 + H of the next voxel; where the coordinates differ there is a next one.
         let beyond = |axis: usize, from: u32, to: u32, stride: usize| match from.cmp(&to) {
             std::cmp::Ordering::Less => distance <= self.plane_value(2 * axis, index + stride).into(),
@@ -98,7 +100,7 @@ impl Dsz {
         self.plane_value(0, index) != 0
             && beyond(0, a.i, b.i, 1)
             && beyond(1, a.j, b.j, row)
-            && beyond(2, a.k, b.k, row * self.resolution.y as usize)
+            && beyond(2, a.k, b.k, row * self.resolution.y() as usize)
     }
 }
 

@@ -58,14 +58,14 @@ impl ExtendedNeighbourhood {
     #[must_use]
     pub fn new(occupied: &VoxelSet, light: VoxelBox) -> Self {
         let resolution = occupied.resolution();
-        let height = resolution.y as usize;
-        let mut rows = vec![Run::EMPTY; height * resolution.z as usize];
+        let height = resolution.y() as usize;
+        let mut rows = vec![Run::EMPTY; height * resolution.z() as usize];
         let at = |j: u32, k: u32| j as usize + height * k as usize;
         let (min, max) = (light.min(), light.max());
         if resolution.contains(max) {
-            for (slices, towards_k) in outwards(min.k, max.k, resolution.z) {
-                for (lines, towards_j) in outwards(min.j, max.j, resolution.y) {
-                    let mut run = Run { first: 0, end: resolution.x };
+            for (slices, towards_k) in outwards(min.k, max.k, resolution.z()) {
+                for (lines, towards_j) in outwards(min.j, max.j, resolution.y()) {
+                    let mut run = Run { first: 0, end: resolution.x() };
                     if let Some(k) = towards_k {
                         run = run.intersection(rows[at(*lines.start(), k)]);
                     }
@@ -88,7 +88,7 @@ impl ExtendedNeighbourhood {
 
     #[inline]
     fn run(&self, j: u32, k: u32) -> Run {
-        let index = j as usize + self.resolution.y as usize * k as usize;
+        let index = j as usize + self.resolution.y() as usize * k as usize;
         self.rows.get(index).copied().unwrap_or(Run::EMPTY)
     }
 
@@ -121,7 +121,7 @@ impl Neighbourhood for ExtendedNeighbourhood {
     #[inline]
     fn proves(&self, voxel: Voxel) -> bool {
         let run = self.run(voxel.j, voxel.k);
-        (run.first <= voxel.i) & (voxel.i < run.end) & (voxel.j < self.resolution.y)
+        (run.first <= voxel.i) & (voxel.i < run.end) & (voxel.j < self.resolution.y())
     }
 
     fn voxels(&self) -> Cow<'_, VoxelSet> {
@@ -241,7 +241,7 @@ mod tests {
                     Run { end: run.end + 1, ..run },
                     Run { end: run.end.saturating_sub(1), ..run },
                 ];
-                for changed in changed.into_iter().filter(|c| c.members() != run.members() && c.end <= resolution.x) {
+                for changed in changed.into_iter().filter(|c| c.members() != run.members() && c.end <= resolution.x()) {
                     near.rows[n] = changed;
                     assert!(near.validate(&occupied).is_err(), "{light:?}: row {n} is {changed:?}, not {run:?}");
                 }

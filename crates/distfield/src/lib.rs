@@ -10,6 +10,7 @@ mod dsz;
 mod dual;
 mod error;
 mod extended;
+mod lines;
 mod manhattan;
 mod metric;
 mod ndf;

@@ -57,8 +57,8 @@ impl SafeNeighbourhood {
             return Self { light, voxels: VoxelSet::new(resolution) };
         }
         let voxels = VoxelSet::from_rows(resolution, |j, k, row| {
-            for (word, first) in row.iter_mut().zip((0..resolution.x).step_by(64)) {
-                for i in first..resolution.x.min(first.saturating_add(64)) {
+            for (word, first) in row.iter_mut().zip((0..resolution.x()).step_by(64)) {
+                for i in first..resolution.x().min(first.saturating_add(64)) {
                     *word |= u64::from(field.proves(light, Voxel::new(i, j, k))) << (i - first);
                 }
             }

@@ -88,10 +88,10 @@ pub(crate) fn for_all(
     check: impl Fn(Voxel) -> Result<(), FieldError> + Sync,
 ) -> Result<(), FieldError> {
     let slice = |k| {
-        let rows = (0..resolution.y).flat_map(|j| (0..resolution.x).map(move |i| Voxel::new(i, j, k)));
+        let rows = (0..resolution.y()).flat_map(|j| (0..resolution.x()).map(move |i| Voxel::new(i, j, k)));
         rows.map(&check).find_map(Result::err)
     };
-    (0..resolution.z).into_par_iter().find_map_first(slice).map_or(Ok(()), Err)
+    (0..resolution.z()).into_par_iter().find_map_first(slice).map_or(Ok(()), Err)
 }
 
 #[cfg(test)]

@@ -127,7 +127,7 @@ impl Provers {
             VoxelSet::bytes,
         )?;
         let r = grid.resolution();
-        report.resolution = Some([r.x, r.y, r.z]);
+        report.resolution = Some(r.sides());
         report.voxel_size = options.voxel_size;
         (report.occupied, report.voxels) = (occupied.count(), r.voxel_count());
         let field = report.step("field", || Ok(DistanceField::build(kind, &occupied)), DistanceField::bytes)?;
@@ -136,8 +136,7 @@ impl Provers {
             LightBuilder { point: options.method.point_prover(), grid, occupied: &occupied, field: &field, triangles };
         let build = || lights.par_iter().map(|light| builder.prover(light)).collect::<Result<Vec<_>, _>>();
         let provers = report.step("neighbourhoods", build, |all| all.iter().map(LightProver::bytes).sum())?;
-        report.lights =
-            provers.iter().map(|p| LightReport { voxels: p.voxels(), bytes: p.bytes() }).collect();
+        report.lights = provers.iter().map(|p| LightReport { voxels: p.voxels(), bytes: p.bytes() }).collect();
         Ok((Self::new(grid, Some(FieldProver::new(grid, field)), provers), report))
     }
 }
@@ -169,9 +168,9 @@ impl LightBuilder<'_> {
     fn point_prover(&self, light: Voxel) -> LightProver {
         match self.point {
             PointProver::Field => LightProver::Field,
-            PointProver::Safe => LightProver::Safe(
-                each_field!(self.field, field => SafeNeighbourhood::new(field, self.occupied, light)),
-            ),
+            PointProver::Safe => {
+                LightProver::Safe(each_field!(self.field, field => SafeNeighbourhood::new(field, self.occupied, light)))
+            }
             PointProver::Extended => LightProver::Extended(ExtendedNeighbourhood::new(self.occupied, light.into())),
         }
     }

@@ -91,8 +91,7 @@ impl<R: Recorder> Visibility<'_, R> {
         if spatial && self.segment_first {
             counters.flights += 1;
             // The bounds of all occluders are a proof, too, and cheaper than a field, whose bytes are seldom in the cache.
-            if self.bvh.bounds().misses(flight)
-                || self.provers.answer_between(flight.p, flight.q) == Answer::Unoccluded
+            if self.bvh.bounds().misses(flight) || self.provers.answer_between(flight.p, flight.q) == Answer::Unoccluded
             {
                 counters.flights_proved += 1;
                 return None;

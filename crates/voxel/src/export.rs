@@ -51,7 +51,8 @@ fn describe(grid: &VoxelGrid, set: &VoxelSet, out: &mut (impl Write + ?Sized)) -
     let (r, o) = (grid.resolution(), grid.origin());
     debug_assert_eq!(r, set.resolution());
     writeln!(out, "# {} of {} voxels", set.count(), r.voxel_count())?;
-    writeln!(out, "# resolution {} {} {}", r.x, r.y, r.z)?;
+    let [x, y, z] = r.sides();
+    writeln!(out, "# resolution {x} {y} {z}")?;
     writeln!(out, "# origin {} {} {}", o.x, o.y, o.z)?;
     writeln!(out, "# voxel size {}", grid.voxel_size())
 }
@@ -91,7 +92,7 @@ struct Corners {
 
 impl Corners {
     fn of(set: &VoxelSet) -> Self {
-        let Resolution { x, y, z } = set.resolution();
+        let [x, y, z] = set.resolution().sides();
         let set = VoxelSet::from_rows(Resolution::new(x + 1, y + 1, z + 1), |j, k, row| {
             // The four rows of voxels around this row of corners; those beyond the grid have no words.
             let around =
@@ -123,7 +124,7 @@ impl Corners {
 
     fn number(&self, corner: Voxel) -> u64 {
         let row = self.set.row(corner.j, corner.k);
-        let row_number = corner.j as usize + self.set.resolution().y as usize * corner.k as usize;
+        let row_number = corner.j as usize + self.set.resolution().y() as usize * corner.k as usize;
         let (word, bit) = ((corner.i / 64) as usize, corner.i % 64);
         let in_words: u64 = row.iter().take(word).map(|w| u64::from(w.count_ones())).sum();
         let in_word = row.get(word).map_or(0, |w| (w & ((1 << bit) - 1)).count_ones());

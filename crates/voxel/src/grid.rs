@@ -40,15 +40,21 @@ impl fmt::Display for Voxel {
     }
 }
 
-/// The number of voxels of a grid along each axis; at least 1 each.
+/// A point in grid coordinates: in voxels, from the grid's origin. Points in world units are plain [`DVec3`]s, so that the
+/// two cannot be mixed up; only [`VoxelGrid::grid_coordinates`] leads from one to the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GridPoint(pub(crate) DVec3);
+
+/// The number of voxels of a grid along each axis; at least 1 each, by construction:
+///
+/// ```compile_fail
+/// let none = vdf_voxel::Resolution { x: 0, y: 1, z: 1 };
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Resolution {
-    /// Voxels along x.
-    pub x: u32,
-    /// Voxels along y.
-    pub y: u32,
-    /// Voxels along z.
-    pub z: u32,
+    x: u32,
+    y: u32,
+    z: u32,
 }
 
 impl Resolution {
@@ -61,10 +67,46 @@ impl Resolution {
         Self { x: positive(x), y: positive(y), z: positive(z) }
     }
 
-    /// The number of voxels.
+    /// Voxels along x, at least 1.
     #[must_use]
+    #[inline]
+    pub const fn x(self) -> u32 {
+        self.x
+    }
+
+    /// Voxels along y, at least 1.
+    #[must_use]
+    #[inline]
+    pub const fn y(self) -> u32 {
+        self.y
+    }
+
+    /// Voxels along z, at least 1.
+    #[must_use]
+    #[inline]
+    pub const fn z(self) -> u32 {
+        self.z
+    }
+
+    /// Voxels along x, y and z.
+    #[must_use]
+    #[inline]
+    pub const fn sides(self) -> [u32; 3] {
+        [self.x, self.y, self.z]
+    }
+
+    /// The number of voxels, at least 1; `usize::MAX` if there are more.
+    #[must_use]
+    #[inline]
     pub const fn voxel_count(self) -> usize {
-        self.x as usize * self.y as usize * self.z as usize
+        (self.x as usize).saturating_mul(self.row_count())
+    }
+
+    /// The number of rows along x, Y·Z, at least 1; `usize::MAX` if there are more.
+    #[must_use]
+    #[inline]
+    pub const fn row_count(self) -> usize {
+        (self.y as usize).saturating_mul(self.z as usize)
     }
 
     /// True if `voxel` is one of the grid's.
@@ -192,11 +234,20 @@ impl VoxelGrid {
     #[must_use]
     #[inline]
     pub fn voxel_containing(&self, point: DVec3) -> Option<Voxel> {
-        let t = self.grid_coordinates(point);
+        let at = self.grid_coordinates(point);
+        let GridPoint(t) = at;
         // NaN fails every comparison; −0.0 passes as 0.0.
         let inside = (t.x >= 0.0) & (t.y >= 0.0) & (t.z >= 0.0);
         let inside = inside & (t.x <= self.upper.x) & (t.y <= self.upper.y) & (t.z <= self.upper.z);
-        inside.then(|| self.truncated(t))
+        inside.then(|| self.truncated(at))
+    }
+
+    /// The voxel nearest to `point`: the one that holds it, or one at the border if the point is outside the grid. A
+    /// coordinate that is not a number counts as the least. Clamping is done in grid coordinates, so it does not depend on
+    /// where in the world the grid lies.
+    #[must_use]
+    pub fn nearest_voxel(&self, point: DVec3) -> Voxel {
+        self.truncated(self.grid_coordinates(point))
     }
 
     /// The linear coordinate i + j·X + k·X·Y of a voxel (Def. 6 in \[Houska2013\]).
@@ -220,13 +271,13 @@ impl VoxelGrid {
 
     /// (p − o)/s with three roundings.
     #[inline]
-    pub(crate) fn grid_coordinates(&self, point: DVec3) -> DVec3 {
-        (point - self.origin) * self.inverse_size
+    pub(crate) fn grid_coordinates(&self, point: DVec3) -> GridPoint {
+        GridPoint((point - self.origin) * self.inverse_size)
     }
 
     /// The voxel of grid coordinates; what is outside goes to the nearest voxel.
     #[inline]
-    pub(crate) fn truncated(&self, t: DVec3) -> Voxel {
+    pub(crate) fn truncated(&self, GridPoint(t): GridPoint) -> Voxel {
         let last = self.resolution.last();
         Voxel::new((t.x as u32).min(last.i), (t.y as u32).min(last.j), (t.z as u32).min(last.k))
     }

@@ -50,10 +50,10 @@ impl VoxelSet {
     fn validate_padding(&self) -> Result<(), VoxelError> {
         let resolution = self.resolution();
         let padding = !padding_mask(resolution);
-        for (j, k) in (0..resolution.z).flat_map(|k| (0..resolution.y).map(move |j| (j, k))) {
+        for (j, k) in (0..resolution.z()).flat_map(|k| (0..resolution.y()).map(move |j| (j, k))) {
             let extra = self.row(j, k).last().copied().unwrap_or_default() & padding;
             if extra != 0 {
-                let i = (resolution.x - 1) / 64 * 64 + extra.trailing_zeros();
+                let i = (resolution.x() - 1) / 64 * 64 + extra.trailing_zeros();
                 return Err(VoxelError::PaddingNotClear { voxel: Voxel::new(i, j, k) });
             }
         }

@@ -23,7 +23,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub(crate) use self::atomic_bits::AtomicBits;
-use crate::{VoxelError, VoxelGrid, VoxelSet};
+use crate::{VoxelError, VoxelGrid, VoxelSet, grid::GridPoint};
 
 /// How triangles become voxels. Both methods keep the guarantee of [`voxelize`]; sets differ at most in voxels that miss
 /// a triangle by less than 2δ.
@@ -88,7 +88,7 @@ where
 /// A triangle in grid coordinates, and what of the grid it can touch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GridTriangle {
-    vertices: [DVec3; 3],
+    vertices: [GridPoint; 3],
     /// The first and the last voxel along each axis that the dilated bounds of the triangle touch.
     bounds: [[u32; 2]; 3],
     dilation: f64,
@@ -105,15 +105,15 @@ impl GridTriangle {
             return Err(VoxelError::NonFiniteTriangle);
         }
         let vertices = triangle.map(|v| grid.grid_coordinates(v.as_dvec3()));
-        let [a, b, c] = vertices;
+        let [GridPoint(a), GridPoint(b), GridPoint(c)] = vertices;
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
         let dilation = share * grid.dilation_reaching(min.abs().max(max.abs()).max_element());
         let (low, high) = (min - dilation, max + dilation);
         let resolution = grid.resolution();
         let (Some(x), Some(y), Some(z)) = (
-            touched(low.x, high.x, resolution.x),
-            touched(low.y, high.y, resolution.y),
-            touched(low.z, high.z, resolution.z),
+            touched(low.x, high.x, resolution.x()),
+            touched(low.y, high.y, resolution.y()),
+            touched(low.z, high.z, resolution.z()),
         ) else {
             return Ok(None);
         };

@@ -47,7 +47,7 @@ impl AreaNeighbourhood {
     pub fn build(grid: &VoxelGrid, triangles: &[Triangle], light: &[Triangle]) -> Result<Option<Self>, VoxelError> {
         let margin = MARGIN * grid.voxel_size();
         let resolution = grid.resolution();
-        let greatest = grid.corner(Voxel::new(resolution.x, resolution.y, resolution.z));
+        let greatest = grid.corner(Voxel::new(resolution.x(), resolution.y(), resolution.z()));
         let corner = |point: DVec3| grid.voxel_containing(point.clamp(grid.origin(), greatest));
         let Bounds { min, max } = Bounds::of_triangles(light);
         let (Some(first), Some(last)) = (corner(min - margin), corner(max + margin)) else { return Ok(None) };

@@ -27,11 +27,9 @@ fn each_question_uses_its_own_proofs() {
         [(&Provers::none(), false, false), (&point, true, false), (&area, false, true)]
     {
         let visibility = Visibility::new(&bvh, provers);
-        for (kind, believed) in [
-            (QueryKind::Spatial, spatial_proof),
-            (QueryKind::OnLight, on_light_proof),
-            (QueryKind::Superficial, false),
-        ] {
+        for (kind, believed) in
+            [(QueryKind::Spatial, spatial_proof), (QueryKind::OnLight, on_light_proof), (QueryKind::Superficial, false)]
+        {
             let mut counters = Counters::default();
             let query = ShadowQuery { from, to, emitter: 0, kind };
             assert_eq!(visibility.unoccluded(&query, &mut counters), believed, "{kind:?}");

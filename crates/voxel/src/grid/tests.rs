@@ -42,6 +42,25 @@ fn negative_zero_as_origin() {
 }
 
 #[test]
+fn no_resolution_is_empty() {
+    let one = Resolution::new(0, 0, 0);
+    assert_eq!((one, one.voxel_count(), one.last()), (Resolution::new(1, 1, 1), 1, Voxel::new(0, 0, 0)));
+    let most = Resolution::new(u32::MAX, u32::MAX, u32::MAX);
+    assert_eq!((most.voxel_count(), most.sides()), (usize::MAX, [u32::MAX; 3]), "counts do not wrap around");
+}
+
+#[test]
+fn the_nearest_voxel_is_in_the_grid() {
+    for offset in [0.0, 1e6] {
+        let min = DVec3::splat(offset);
+        let grid = VoxelGrid::covering(min, min + DVec3::splat(9.0), 0.3, BUDGET).expect("a legal grid");
+        for (x, i) in [(-1e300, 0), (-0.1, 0), (0.4, 1), (8.9, 29), (9.1, 29), (1e300, 29), (f64::NAN, 0)] {
+            assert_eq!(grid.nearest_voxel(DVec3::splat(offset + x)), Voxel::new(i, i, i), "{x}");
+        }
+    }
+}
+
+#[test]
 fn flat_scenes_get_one_layer() {
     let grid = VoxelGrid::covering(DVec3::new(0.0, 3.0, 0.0), DVec3::new(4.0, 3.0, 0.0), 1.0, BUDGET);
     let grid = grid.expect("a legal grid");

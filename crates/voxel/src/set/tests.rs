@@ -30,7 +30,10 @@ fn voxels_beyond_the_grid_are_never_in_the_set() {
         set.insert(v);
     }
     assert_eq!(set.count(), 65 * 4);
-    assert!(set.row(0, 2).is_empty());
+    // The row after the last one of a slice is none, not the first one of the next slice.
+    for (j, k) in [(0, 2), (2, 0), (3, 0), (u32::MAX, 0), (0, u32::MAX), (u32::MAX, u32::MAX)] {
+        assert!(set.row(j, k).is_empty(), "({j}, {k})");
+    }
 }
 
 #[test]

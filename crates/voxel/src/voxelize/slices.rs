@@ -21,9 +21,8 @@
 //! of a run. So O(n²) for a triangle across n³ voxels, whatever its direction. A triangle inside one voxel, or inside
 //! a straight row of them, needs no clip.
 
-use glam::DVec3;
-
 use super::{AtomicBits, GridTriangle, touched};
+use crate::grid::GridPoint;
 
 /// Adds the voxels that touch a triangle.
 pub(super) fn scan(triangle: &GridTriangle, bits: &AtomicBits) {
@@ -68,15 +67,15 @@ struct Edge {
 }
 
 impl Slice {
-    fn of(vertices: &[DVec3; 3], low: f64, high: f64) -> Self {
+    fn of(vertices: &[GridPoint; 3], low: f64, high: f64) -> Self {
         // A plane takes one corner off a triangle and leaves two, so two planes leave at most five; six fit.
         let (mut points, mut len) = ([[0.0; 2]; 6], 0);
         let mut push = |point: [f64; 2]| {
             points[len] = point;
             len += 1;
         };
-        let mut a = vertices[2];
-        for &b in vertices {
+        let GridPoint(mut a) = vertices[2];
+        for &GridPoint(b) in vertices {
             // Always from the lower end, so that the order of the vertices does not matter.
             let (from, to) = if a.z <= b.z { (a, b) } else { (b, a) };
             if from.z <= high && to.z >= low {
