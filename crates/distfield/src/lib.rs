@@ -26,7 +26,7 @@ pub use dual::Dual;
 pub use error::FieldError;
 pub use extended::ExtendedNeighbourhood;
 pub use metric::{chessboard_distance, manhattan_distance};
-pub use ndf::Ndf;
+pub use ndf::{Ndf, NdfBuilder};
 pub use neighbourhood::{Neighbourhood, SafeNeighbourhood};
 pub use safe_zones::SafeZones;
 pub use voxel_box::VoxelBox;
