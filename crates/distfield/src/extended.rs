@@ -86,10 +86,23 @@ impl ExtendedNeighbourhood {
         Self { resolution, light, rows }
     }
 
+    /// The memory of a neighbourhood in such a grid, in bytes; `u64::MAX` if it is more.
+    #[must_use]
+    pub const fn bytes_of(resolution: Resolution) -> u64 {
+        (resolution.row_count() as u64).saturating_mul(size_of::<Run>() as u64)
+    }
+
     #[inline]
     fn run(&self, j: u32, k: u32) -> Run {
         let index = j as usize + self.resolution.y() as usize * k as usize;
         self.rows.get(index).copied().unwrap_or(Run::EMPTY)
+    }
+
+    /// The members of the row (·, j, k), as their coordinates i.
+    #[inline]
+    pub(crate) fn members(&self, j: u32, k: u32) -> std::ops::Range<u32> {
+        let Run { first, end } = self.run(j, k);
+        first..end
     }
 
     /// Whether `voxel` must be a member, from the members one step towards the light and the occupied voxels.

@@ -7,7 +7,7 @@
 //! *Guarantee.* Exactly the answers of the field, [`SafeZones::proves`]; so its guarantee.
 //!
 //! *Cost.* X·Y·Z bits per light; one load a query, and the voxel of the light is not needed. The build asks the field for every
-//! voxel, in parallel over slices.
+//! voxel of the extended neighbourhood, which holds this one, in parallel over slices.
 //!
 //! *Limits.* One set per light. A light in an occupied voxel proves nothing.
 
@@ -49,18 +49,18 @@ pub struct SafeNeighbourhood {
 
 impl SafeNeighbourhood {
     /// The safe neighbourhood of the voxel `light` in a field that was built from `occupied`; empty if `light` is
-    /// occupied or outside the grid.
+    /// occupied or outside the grid, or if the two are of different grids.
     #[must_use]
     pub fn new<F: SafeZones + ?Sized>(field: &F, occupied: &VoxelSet, light: Voxel) -> Self {
         let resolution = field.resolution();
-        if occupied.contains(light) || !resolution.contains(light) {
+        if resolution != occupied.resolution() || occupied.contains(light) || !resolution.contains(light) {
             return Self { light, voxels: VoxelSet::new(resolution) };
         }
+        // What a field proves has a free cuboid, so it need not be asked about other voxels.
+        let extended = ExtendedNeighbourhood::new(occupied, light.into());
         let voxels = VoxelSet::from_rows(resolution, |j, k, row| {
-            for (word, first) in row.iter_mut().zip((0..resolution.x()).step_by(64)) {
-                for i in first..resolution.x().min(first.saturating_add(64)) {
-                    *word |= u64::from(field.proves(light, Voxel::new(i, j, k))) << (i - first);
-                }
+            for i in extended.members(j, k) {
+                row[(i / 64) as usize] |= u64::from(field.proves(light, Voxel::new(i, j, k))) << (i % 64);
             }
         });
         Self { light, voxels }

@@ -186,7 +186,6 @@ impl VoxelGrid {
             return Err(VoxelError::TooManyVoxels { size: voxel_size, voxels, budget, smallest: smallest() });
         }
 
-        let counts = counts(extent, voxel_size);
         let inverse_size = voxel_size.recip();
         // Adding zero turns −0.0 into 0.0.
         let origin = min + DVec3::ZERO;
@@ -194,10 +193,36 @@ impl VoxelGrid {
             origin,
             voxel_size,
             inverse_size,
-            resolution: Resolution::new(counts.x as u32, counts.y as u32, counts.z as u32),
-            upper: counts * (1.0 + 8.0 * f64::EPSILON),
+            resolution: resolution(extent, voxel_size),
+            upper: counts(extent, voxel_size) * (1.0 + 8.0 * f64::EPSILON),
             magnitude: (largest + origin.abs().max_element()) * inverse_size,
         })
+    }
+
+    /// [`Self::covering`] with a limit of memory: `bytes` says what will be stored for a grid of a resolution, and must not grow when a
+    /// side of the grid shrinks.
+    ///
+    /// # Errors
+    /// Those of [`Self::covering`], and [`VoxelError::TooMuchMemory`] if `bytes` gives more than `max_bytes`; that names a size that
+    /// works and is the smallest but for rounding to three digits.
+    pub fn covering_within(
+        min: DVec3,
+        max: DVec3,
+        voxel_size: f64,
+        max_voxels: u64,
+        max_bytes: u64,
+        bytes: impl Fn(Resolution) -> u64,
+    ) -> Result<Self, VoxelError> {
+        let grid = Self::covering(min, max, voxel_size, max_voxels)?;
+        let needed = bytes(grid.resolution);
+        // A grid of one voxel is always allowed, so that there is a size that works.
+        let limit = max_bytes.max(bytes(Resolution::new(1, 1, 1)));
+        if needed <= limit {
+            return Ok(grid);
+        }
+        let fits = |size: f64| bytes(resolution(max - min, size)) <= limit;
+        let smallest = smallest_that_fits(voxel_size, (max - min).max_element(), fits);
+        Err(VoxelError::TooMuchMemory { size: voxel_size, bytes: needed, limit: max_bytes, smallest })
     }
 
     /// The least corner of the grid.
@@ -297,6 +322,11 @@ fn counts(extent: DVec3, size: f64) -> DVec3 {
     (extent / size).ceil().max(DVec3::ONE)
 }
 
+fn resolution(extent: DVec3, size: f64) -> Resolution {
+    let counts = counts(extent, size);
+    Resolution::new(counts.x as u32, counts.y as u32, counts.z as u32)
+}
+
 fn count(extent: DVec3, size: f64) -> f64 {
     let counts = counts(extent, size);
     counts.x * counts.y * counts.z
@@ -312,11 +342,15 @@ fn finest_size(largest: f64) -> f64 {
 
 /// The smallest voxel size that is at least `finest` and within the budget, rounded up to three digits.
 fn smallest_usable(extent: DVec3, finest: f64, budget: u64) -> f64 {
-    let fits = |size: f64| count(extent, size) <= budget as f64;
+    smallest_that_fits(finest, extent.max_element(), |size| count(extent, size) <= budget as f64)
+}
+
+/// The smallest size that is at least `finest` and fits, rounded up to three digits. What fits must fit in larger voxels, too, and
+/// anything fits in voxels of the size `largest`.
+fn smallest_that_fits(finest: f64, largest: f64, fits: impl Fn(f64) -> bool) -> f64 {
     let mut size = finest;
     if !fits(size) {
-        // The count never grows with the size, and one voxel always fits.
-        let (mut low, mut high) = (finest, finest.max(extent.max_element()));
+        let (mut low, mut high) = (finest, finest.max(largest));
         for _ in 0..100 {
             let middle = (low * high).sqrt();
             if fits(middle) {

@@ -24,4 +24,4 @@ pub use error::VoxelError;
 pub use export::{write_indices, write_obj};
 pub use grid::{Resolution, Voxel, VoxelGrid};
 pub use set::VoxelSet;
-pub use voxelize::{Voxelizer, voxelize, voxelize_with};
+pub use voxelize::{Voxelizer, voxel_bounds, voxelize, voxelize_with};

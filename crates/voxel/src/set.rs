@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{Resolution, Voxel};
+use crate::{Resolution, Voxel, VoxelError};
 
 /// A set of voxels of one grid.
 ///
@@ -69,6 +69,36 @@ impl VoxelSet {
         if self.resolution.contains(voxel) {
             self.words[word] |= 1 << bit;
         }
+    }
+
+    /// Adds all voxels of another set.
+    ///
+    /// # Errors
+    /// If it is of a grid of another resolution.
+    pub fn insert_all(&mut self, other: &Self) -> Result<(), VoxelError> {
+        self.each_word(other, |word, other| *word |= other)
+    }
+
+    /// Removes all voxels of another set.
+    ///
+    /// # Errors
+    /// If it is of a grid of another resolution.
+    pub fn remove_all(&mut self, other: &Self) -> Result<(), VoxelError> {
+        self.each_word(other, |word, other| *word &= !other)
+    }
+
+    fn each_word(&mut self, other: &Self, change: impl Fn(&mut u64, u64)) -> Result<(), VoxelError> {
+        if self.resolution != other.resolution {
+            return Err(VoxelError::ResolutionMismatch { set: other.resolution, grid: self.resolution });
+        }
+        self.words.iter_mut().zip(&other.words).for_each(|(word, &other)| change(word, other));
+        Ok(())
+    }
+
+    /// The memory of the bits of a set of such a grid, in bytes; `u64::MAX` if it is more.
+    #[must_use]
+    pub const fn bytes_of(resolution: Resolution) -> u64 {
+        8_u64.saturating_mul(resolution.x().div_ceil(64) as u64).saturating_mul(resolution.row_count() as u64)
     }
 
     /// The number of voxels in the set.

@@ -23,7 +23,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub(crate) use self::atomic_bits::AtomicBits;
-use crate::{VoxelError, VoxelGrid, VoxelSet, grid::GridPoint};
+use crate::{Voxel, VoxelError, VoxelGrid, VoxelSet, grid::GridPoint};
 
 /// How triangles become voxels. Both methods keep the guarantee of [`voxelize`]; sets differ at most in voxels that miss
 /// a triangle by less than 2δ.
@@ -65,6 +65,16 @@ where
             scan_all(grid, triangles, |triangle, bits| triangle.scan_by_axes(|[i, j, k]| bits.insert_run(j, k, [i; 2])))
         }
     }
+}
+
+/// The box of voxels around a triangle: the first and the last voxel of all that [`voxelize`] may add for it, `None` if there are none.
+/// Some of the box's voxels may not touch the triangle, but no voxel beyond the box is added for it.
+///
+/// # Errors
+/// If a vertex is not finite.
+pub fn voxel_bounds(grid: &VoxelGrid, triangle: [Vec3; 3]) -> Result<Option<[Voxel; 2]>, VoxelError> {
+    let triangle = GridTriangle::new(grid, triangle, 1.0)?;
+    Ok(triangle.map(|GridTriangle { bounds: [x, y, z], .. }| [0, 1].map(|end| Voxel::new(x[end], y[end], z[end]))))
 }
 
 fn scan_all<T>(

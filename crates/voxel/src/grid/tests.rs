@@ -95,6 +95,24 @@ fn voxels_below_single_precision_are_an_error_that_names_what_works() {
 
 proptest! {
     #[test]
+    fn the_size_named_for_too_much_memory_works(
+        extent in prop::array::uniform3(0f64..100.0), size in 0.1f64..3.0, limit in prop_oneof![0u64..1000, 0u64..10_000_000],
+    ) {
+        let extent = DVec3::from_array(extent);
+        let bytes = |r: Resolution| 8 * r.voxel_count() as u64 + 8 * r.row_count() as u64;
+        let covering = |size| VoxelGrid::covering_within(DVec3::ZERO, extent, size, BUDGET, limit, bytes);
+        match covering(size) {
+            Ok(grid) => prop_assert!(bytes(grid.resolution()) <= limit.max(16)),
+            Err(error @ VoxelError::TooMuchMemory { smallest, bytes, .. }) => {
+                prop_assert!(bytes > limit && smallest > size, "{error}");
+                prop_assert!(covering(smallest).is_ok(), "{error}");
+                prop_assert!(covering((smallest * 0.98).max(size)).is_err(), "{error}");
+            }
+            Err(other) => prop_assert!(false, "{other}"),
+        }
+    }
+
+    #[test]
     fn the_named_size_works_and_is_nearly_the_smallest(
         min in prop::array::uniform3(-1e4f64..1e4), extent in prop::array::uniform3(0f64..1e4),
         exponent in -12f64..1.0, budget in prop_oneof![0u64..100, 100u64..1_000_000],

@@ -46,3 +46,23 @@ fn filling_rows_keeps_the_padding_clear() {
         assert_eq!(one.iter().collect::<Vec<_>>(), [Voxel::new(0, 2, 1)]);
     }
 }
+
+#[test]
+fn sets_are_added_and_removed() {
+    let resolution = Resolution::new(67, 2, 2);
+    let every = |n: u32| {
+        let mut set = VoxelSet::new(resolution);
+        set.extend(resolution.voxels().filter(|v| (v.i + v.j + v.k) % n == 0));
+        set
+    };
+    let (two, three) = (every(2), every(3));
+    let (mut both, mut only) = (two.clone(), two.clone());
+    assert_eq!((both.insert_all(&three), only.remove_all(&three)), (Ok(()), Ok(())));
+    for v in resolution.voxels() {
+        assert_eq!(both.contains(v), two.contains(v) || three.contains(v));
+        assert_eq!(only.contains(v), two.contains(v) && !three.contains(v));
+    }
+    assert_eq!(VoxelSet::bytes_of(resolution), two.bytes() as u64);
+    let other = VoxelSet::new(Resolution::new(67, 4, 1));
+    assert!(both.insert_all(&other).is_err() && both.remove_all(&other).is_err());
+}

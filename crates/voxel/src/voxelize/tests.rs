@@ -1,7 +1,6 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::Voxel;
 
 const VOXELIZERS: [Voxelizer; 2] = [Voxelizer::Slices, Voxelizer::SeparatingAxes];
 
@@ -102,6 +101,20 @@ proptest! {
     #[test]
     fn far_from_zero(triangle in triangle().prop_filter("exact", |t| t.iter().flatten().all(|&c| c >= 0))) {
         check(SIDES, 524_288.0, triangle.map(|v| v.map(|c| c.min(60_000))))?;
+    }
+
+    #[test]
+    fn bounds_hold_all_voxels(triangle in triangle()) {
+        let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::from_array(SIDES.map(f64::from)), 1.0, 1 << 28).expect("a legal grid");
+        let world = triangle.map(|v| Vec3::from_array(v.map(|c| c as f32 / 16.0)));
+        let set = voxelize(&grid, vec![world]).expect("finite");
+        let bounds = voxel_bounds(&grid, world).expect("finite");
+        prop_assert!(bounds.is_some() || set.is_empty());
+        for v in set.iter() {
+            let [first, last] = bounds.expect("not empty");
+            prop_assert!(first.i <= v.i && first.j <= v.j && first.k <= v.k, "{first} {v}");
+            prop_assert!(v.i <= last.i && v.j <= last.j && v.k <= last.k, "{last} {v}");
+        }
     }
 
     #[test]
