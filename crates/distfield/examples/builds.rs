@@ -2,7 +2,7 @@
 //! programs only ever slow a run down.
 //!
 //! ```text
-//! RAYON_NUM_THREADS=2 cargo run --release -p vdf-distfield --example builds -- [greatest side] [part of a builder's name]
+//! RAYON_NUM_THREADS=2 cargo run --release -p vdf-distfield --example builds -- [greatest side] [part of a builder's name] [least side]
 //! ```
 
 use std::{hint::black_box, time::Instant};
@@ -72,10 +72,11 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let greatest = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(256);
     let name = arguments.next().unwrap_or_default();
+    let least = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(32);
     println!("M voxels/s, {} threads; in brackets M voxels a second of one core", rayon::current_num_threads());
     println!("| builder | voxels | one voxel | 1 in 2¹⁸ | room | 1 in 50 |");
     println!("| --- | --- | --- | --- | --- | --- |");
-    for n in [32, 64, 128, 256, 512].into_iter().filter(|&n| n <= greatest) {
+    for n in [32, 64, 128, 256, 512].into_iter().filter(|&n| n <= greatest && n >= least) {
         let scenes = [scattered(n, u32::MAX), scattered(n, (1 << 18).min(n * n)), room(n), scattered(n, 50)];
         for (builder, build) in BUILDERS.into_iter().filter(|(b, _)| b.contains(&name)) {
             let speeds = scenes.each_ref().map(|set| {

@@ -29,7 +29,9 @@
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 use crate::{
-    FieldError, SafeZones, manhattan, manhattan_distance,
+    FieldError, SafeZones,
+    bytes::Bytes,
+    manhattan, manhattan_distance,
     rows::Ways,
     validate::{self, FACE_STEPS},
 };
@@ -42,7 +44,7 @@ const NAMES: [&str; 6] = ["dsz x+", "dsz x-", "dsz y+", "dsz y-", "dsz z+", "dsz
 pub struct Dsz {
     resolution: Resolution,
     /// Six planes of H, one byte per voxel, in the order of the faces' numbers.
-    distances: Vec<u8>,
+    distances: Bytes,
 }
 
 impl Dsz {
@@ -50,7 +52,7 @@ impl Dsz {
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut distances = vec![0; 6 * resolution.voxel_count()];
+        let mut distances = Bytes::zeroed(resolution.voxel_count().saturating_mul(6));
         for (plane, step) in distances.chunks_exact_mut(resolution.voxel_count()).zip(FACE_STEPS) {
             let ways = step.map(|s| match s {
                 0 => Ways::Both,

@@ -31,6 +31,7 @@ use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 use crate::{
     FieldError, SafeZones,
+    bytes::Bytes,
     lines::{Contiguous, Lines, columns},
     manhattan, manhattan_distance,
     rows::{FAR, Ways},
@@ -48,7 +49,7 @@ const LANES: usize = 256;
 pub struct Dual {
     resolution: Resolution,
     /// Seven planes of one byte per voxel: Dist, then D in the order of the directions' numbers.
-    values: Vec<u8>,
+    values: Bytes,
 }
 
 impl Dual {
@@ -56,7 +57,7 @@ impl Dual {
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut values = vec![0; 7 * resolution.voxel_count()];
+        let mut values = Bytes::zeroed(resolution.voxel_count().saturating_mul(7));
         let (distances, extents) = values.split_at_mut(resolution.voxel_count());
         manhattan::distances(occupied, [Ways::Both; 3], distances);
         let (width, slice) = (resolution.x() as usize, resolution.x() as usize * resolution.y() as usize);

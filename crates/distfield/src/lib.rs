@@ -6,6 +6,7 @@
 //! a free cuboid can prove. Definitions are those of \[Houska2013\], chapters 3 and 4.
 
 mod amr;
+mod bytes;
 mod dsz;
 mod dual;
 mod error;

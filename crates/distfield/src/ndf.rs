@@ -17,7 +17,7 @@ mod wavefront;
 
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
-use crate::{FieldError, SafeZones, chessboard_distance, validate};
+use crate::{FieldError, SafeZones, bytes::Bytes, chessboard_distance, validate};
 
 /// How an [`Ndf`] is built. All builders give the same bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -33,7 +33,7 @@ pub enum NdfBuilder {
 #[derive(Clone, Debug)]
 pub struct Ndf {
     resolution: Resolution,
-    distances: Vec<u8>,
+    distances: Bytes,
 }
 
 impl Ndf {
@@ -47,7 +47,7 @@ impl Ndf {
     #[must_use]
     pub fn build_with(builder: NdfBuilder, occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut distances = vec![0; resolution.voxel_count()];
+        let mut distances = Bytes::zeroed(resolution.voxel_count());
         match builder {
             NdfBuilder::Sweeps => sweeps::distances(occupied, &mut distances),
             NdfBuilder::Wavefront => wavefront::distances(occupied, &mut distances),

@@ -97,12 +97,12 @@ pub(crate) fn for_all(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::SafeZones;
+    use crate::{SafeZones, bytes::Bytes};
 
     /// Damages each stored byte of a field in turn, by one and by much, and requires that each time validation fails.
     pub(crate) fn assert_damage_is_found<F: SafeZones>(
         build: fn(&VoxelSet) -> F,
-        bytes: impl Fn(&mut F) -> &mut Vec<u8>,
+        bytes: impl Fn(&mut F) -> &mut Bytes,
     ) {
         let mut occupied = VoxelSet::new(Resolution::new(7, 5, 6));
         occupied.extend([Voxel::new(1, 1, 1), Voxel::new(5, 1, 2), Voxel::new(2, 4, 5), Voxel::new(2, 3, 5)]);
