@@ -1,5 +1,5 @@
-//! How fast fields are built: millions of voxels a second by size, scene and builder; the fastest of some runs, because other
-//! programs only ever slow a run down.
+//! How fast fields are built: millions of voxels a second by size, scene and builder; the fastest of some runs, because
+//! other programs only ever slow a run down.
 //!
 //! ```text
 //! RAYON_NUM_THREADS=2 cargo run --release -p vdf-distfield --example builds -- [greatest side] [part of a builder's name] [least side]

@@ -3,22 +3,23 @@
 //! *Idea.* A voxel knows eight distances, one for each octant of directions: a wall behind does not shorten
 //! the view ahead.
 //!
-//! *Definition.* dist^oct(V) = min of d_CD(U, V) over the occupied U in the closed octant of V (Def. 9 in \[Houska2013\]);
-//! safe(V) = { U : d_CD(V, U) < dist^oct(V) } for an octant of V that holds U (Def. 10). Where U and V have equal
-//! coordinates several octants hold U. The thesis takes the first; any is sound, so here it is the best. One byte
-//! each, saturated at 255. Beyond the grid there is nothing.
+//! *Definition.* dist^oct(V) = min of d_CD(U, V) over the occupied U in the closed octant of V (Def. 9 in
+//! \[Houska2013\]); safe(V) = { U : d_CD(V, U) < dist^oct(V) } for an octant of V that holds U (Def. 10). Where U and V
+//! have equal coordinates several octants hold U. The thesis takes the first; any is sound, so here it is the best. One
+//! byte each, saturated at 255. Beyond the grid there is nothing.
 //!
 //! *Guarantee.* The cuboid of A and B is in the closed octant of A that holds B and is nowhere farther than B. So if
 //! d_CD(A, B) < dist^oct(A) all of it is free (the free cuboid property, 4.4.1).
 //!
-//! *Cost.* 8·X·Y·Z bytes; two loads a query, up to eight if coordinates are equal. The build is one sweep per octant, in parallel
-//! over octants, against its direction: 0 if occupied, else 1 + the minimum over the 7 neighbours in the octant (4.1).
-//! A row takes the minimum over three finished rows, which vectorizes. By the recurrence these rise by at most 1 from voxel to voxel against the
-//! octant's x, and so does their minimum; so along x nothing is to be swept but the distances to the row's own occupied voxels, which are ramps that are copied.
-//! One plane an octant, not eight bytes a voxel together: measured, that is slower towards point lights (docs/performance.md).
+//! *Cost.* 8·X·Y·Z bytes; two loads a query, up to eight if coordinates are equal. The build is one sweep per octant,
+//! in parallel over octants, against its direction: 0 if occupied, else 1 + the minimum over the 7 neighbours in the
+//! octant (4.1). A row takes the minimum over three finished rows, which vectorizes. By the recurrence these rise by at
+//! most 1 from voxel to voxel against the octant's x, and so does their minimum; so along x nothing is to be swept but
+//! the distances to the row's own occupied voxels, which are ramps that are copied. One plane an octant, not eight
+//! bytes a voxel together: measured, that is slower towards point lights (docs/performance.md).
 //!
-//! *Limits.* Nothing is proved over 255 voxels or more. An occluder in the octant that is beside the segment, not on it, stops
-//! the proof.
+//! *Limits.* Nothing is proved over 255 voxels or more. An occluder in the octant that is beside the segment, not on
+//! it, stops the proof.
 
 use rayon::prelude::*;
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
@@ -60,8 +61,9 @@ impl Amr {
         Self { resolution, distances }
     }
 
-    /// The distance to the nearest occupied voxel in an octant, in voxels, at most 255; 0 for a voxel that the grid does not have.
-    /// Bits 0, 1 and 2 of `octant`, which is below 8, are set where it extends towards smaller i, j and k.
+    /// The distance to the nearest occupied voxel in an octant, in voxels, at most 255; 0 for a voxel that the grid
+    /// does not have. Bits 0, 1 and 2 of `octant`, which is below 8, are set where it extends towards smaller i, j and
+    /// k.
     #[must_use]
     pub fn distance(&self, octant: usize, voxel: Voxel) -> u8 {
         if self.resolution.contains(voxel) { self.at(octant, voxel) } else { 0 }
@@ -156,7 +158,8 @@ fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
             for (nearest, ((&on_y, &on_z), &on_both)) in nearest[1..].iter_mut().zip(finished) {
                 *nearest = on_y.min(on_z).min(on_both);
             }
-            // Finished rows obey the recurrence, so along x only the distances to the row's own occupied voxels are still to spread.
+            // Finished rows obey the recurrence, so along x only the distances to the row's own occupied voxels are
+            // still to spread.
             rows::along_row(occupied.row(j as u32, k as u32), row, ways);
             let nearest = nearest[1..].iter().zip(&nearest[ahead..]);
             for (distance, (&beside, &ahead)) in row.iter_mut().zip(nearest) {
@@ -166,7 +169,8 @@ fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
     }
 }
 
-/// Line `n` of lines that lie behind each other, and the finished line ahead of it, which is the one before if the sweep goes `up`.
+/// Line `n` of lines that lie behind each other, and the finished line ahead of it, which is the one before if the
+/// sweep goes `up`.
 #[inline]
 fn with_ahead(lines: &mut [u8], n: usize, len: usize, up: bool) -> (&mut [u8], Option<&[u8]>) {
     if up {

@@ -1,8 +1,9 @@
 //! The memory of fields: zeroed bytes, in huge pages where the system has them.
 //!
-//! Memory that is fresh from the system costs a page fault for each page at its first touch. With pages of 4 KiB that took most of the
-//! time of building a large field, and each query that misses the cache also waits for the translation of its address. So
-//! the system is asked for huge pages, of 2 MiB on most machines; it may refuse, which costs time and nothing else.
+//! Memory that is fresh from the system costs a page fault for each page at its first touch. With pages of 4 KiB that
+//! took most of the time of building a large field, and each query that misses the cache also waits for the translation
+//! of its address. So the system is asked for huge pages, of 2 MiB on most machines; it may refuse, which costs time
+//! and nothing else.
 
 use std::{
     alloc::{Layout, handle_alloc_error},

@@ -1,30 +1,34 @@
 //! The directed safe zones, `dsz`.
 //!
-//! *Idea.* A segment that leaves its voxel through one face never comes back: only what lies beyond that face matters. So a voxel
-//! knows six distances, one for each face.
+//! *Idea.* A segment that leaves its voxel through one face never comes back: only what lies beyond that face matters.
+//! So a voxel knows six distances, one for each face.
 //!
-//! *Definition.* dist^x+(V) = min of d_Man(U, V) over the occupied U with U_x > V_x, and so for the other five faces (Def. 11 in
-//! \[Houska2013\]); safe^x+(V) = { U : d_Man(U, V) < dist^x+(V), U_x > V_x } (Def. 12). B is in safe(A) if A is free and B is
-//! in the safe zones of *all* faces of A that look towards B; A itself is in safe(A) if it is free.
+//! *Definition.* dist^x+(V) = min of d_Man(U, V) over the occupied U with U_x > V_x, and so for the other five faces
+//! (Def. 11 in \[Houska2013\]); safe^x+(V) = { U : d_Man(U, V) < dist^x+(V), U_x > V_x } (Def. 12). B is in safe(A) if
+//! A is free and B is in the safe zones of *all* faces of A that look towards B; A itself is in safe(A) if it is free.
 //!
 //! *Which face.* The thesis takes the face through which the ray leaves A (4.2.2), and a ray through an edge could take
 //! either. A query here names voxels, and stands for all segments between their points. On each axis on which B differs
-//! from A some of these begin on the face towards B and leave through it at once; so each such face is a candidate,
-//! and only the smallest of their distances is safe. On an axis without difference no segment leaves. To know the face one needs the
-//! points: that would prove more, but it needs its own bound of rounding errors next to edges, it loses the free cuboid, on
-//! which the voxelization's promise rests, and safe neighbourhoods, which know voxels only, could not use it.
+//! from A some of these begin on the face towards B and leave through it at once; so each such face is a candidate, and
+//! only the smallest of their distances is safe. On an axis without difference no segment leaves. To know the face one
+//! needs the points: that would prove more, but it needs its own bound of rounding errors next to edges, it loses the
+//! free cuboid, on which the voxelization's promise rests, and safe neighbourhoods, which know voxels only, could not
+//! use it.
 //!
 //! *Stored form.* dist^x+(V) = 1 + H^x+(V + e_x) with the distance to the *closed* half-space, H^x+(V) = min of
-//! d_Man(U, V) over the occupied U with U_x ≥ V_x. H is stored: it is 0 just for occupied voxels, it is a separable distance
-//! transform, and, unlike dist, it obeys a recurrence between neighbours everywhere, which [`SafeZones::validate`] checks.
+//! d_Man(U, V) over the occupied U with U_x ≥ V_x. H is stored: it is 0 just for occupied voxels, it is a separable
+//! distance transform, and, unlike dist, it obeys a recurrence between neighbours everywhere, which
+//! [`SafeZones::validate`] checks.
 //!
-//! *Guarantee.* Let B be in safe(A). A voxel W ≠ A of their cuboid differs from A on some axis, so it lies strictly beyond
-//! a face of A that looks towards B; and d_Man(W, A) ≤ d_Man(B, A) < dist of that face. So W is free, and A is: the free cuboid property.
+//! *Guarantee.* Let B be in safe(A). A voxel W ≠ A of their cuboid differs from A on some axis, so it lies strictly
+//! beyond a face of A that looks towards B; and d_Man(W, A) ≤ d_Man(B, A) < dist of that face. So W is free, and A is:
+//! the free cuboid property.
 //!
-//! *Cost.* 6·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform a face, each parallel over slices and columns.
+//! *Cost.* 6·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform a face, each parallel over
+//! slices and columns.
 //!
-//! *Limits.* Nothing is proved over 256 voxels or more, in Manhattan distance: a diagonal is three times as long as for `amr`.
-//! Obstacles beside or behind, but beyond one of the faces, stop the proof.
+//! *Limits.* Nothing is proved over 256 voxels or more, in Manhattan distance: a diagonal is three times as long as for
+//! `amr`. Obstacles beside or behind, but beyond one of the faces, stop the proof.
 
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
@@ -64,16 +68,18 @@ impl Dsz {
         Self { resolution, distances }
     }
 
-    /// H: the Manhattan distance to the nearest occupied voxel that is not behind `voxel` as seen in the direction
-    /// of a face, in voxels, at most 255. Faces 0 to 5 look towards x+, x−, y+, y−, z+, z−. 0 for a voxel that the grid does not have.
+    /// H: the Manhattan distance to the nearest occupied voxel that is not behind `voxel` as seen in the direction of a
+    /// face, in voxels, at most 255. Faces 0 to 5 look towards x+, x−, y+, y−, z+, z−. 0 for a voxel that the grid does
+    /// not have.
     #[must_use]
     pub fn half_space_distance(&self, face: usize, voxel: Voxel) -> u8 {
         debug_assert!(face < 6);
         if self.resolution.contains(voxel) { self.plane_value(face, self.resolution.linear_index(voxel)) } else { 0 }
     }
 
-    /// dist of Def. 11: the Manhattan distance to the nearest occupied voxel strictly beyond a face, at most 256. Faces as in
-    /// [`Dsz::half_space_distance`]. Here it does not matter whether the voxel is occupied. 0 for one that the grid does not have.
+    /// dist of Def. 11: the Manhattan distance to the nearest occupied voxel strictly beyond a face, at most 256. Faces
+    /// as in [`Dsz::half_space_distance`]. Here it does not matter whether the voxel is occupied. 0 for one that the
+    /// grid does not have.
     #[must_use]
     pub fn distance(&self, face: usize, voxel: Voxel) -> u16 {
         if !self.resolution.contains(voxel) {

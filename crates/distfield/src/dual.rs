@@ -1,28 +1,29 @@
 //! The dual extents, `dual`.
 //!
-//! *Idea.* One distance in all directions, and for each of the six axis directions how far its ball can be pushed before
-//! it would have to shrink: long corridors become one zone.
+//! *Idea.* One distance in all directions, and for each of the six axis directions how far its ball can be pushed
+//! before it would have to shrink: long corridors become one zone.
 //!
-//! *Definition.* Dist(V) = min over the occupied U of d_Man(U, V). The dual extent distance D^x+(V) is the number of steps
-//! from V towards x+ for which Dist does not fall below Dist(V); the walk ends at the border of the grid (Def. 13 in \[Houska2013\]). With
-//! Δ = U − V the safe zone in that direction is here
+//! *Definition.* Dist(V) = min over the occupied U of d_Man(U, V). The dual extent distance D^x+(V) is the number of
+//! steps from V towards x+ for which Dist does not fall below Dist(V); the walk ends at the border of the grid (Def. 13
+//! in \[Houska2013\]). With Δ = U − V the safe zone in that direction is here
 //!
 //! > dual^x+(V) = { U : Δ_x ≥ 0, |Δ_y| + |Δ_z| < Dist(V), |Δ_x| + |Δ_y| + |Δ_z| < D^x+(V) + Dist(V) },
 //!
 //! and so for the other directions; safe(V) is the union of the six. Dist and D are one byte each, saturated at 255.
 //!
 //! *Departure.* Def. 13 as printed asks for |Δ_y| < Dist and |Δ_z| < Dist, one by one. In two dimensions that is the
-//! same, in three it is wrong: with Dist = 2 and D = 10 it admits Δ = (5, 1, 1), which is in none of the balls of radius 2
-//! around V + n·e_x. A test keeps the counterexample. The printed form also lacks Δ_x ≥ 0, which the choice of the direction (4.3.1) implies.
+//! same, in three it is wrong: with Dist = 2 and D = 10 it admits Δ = (5, 1, 1), which is in none of the balls of
+//! radius 2 around V + n·e_x. A test keeps the counterexample. The printed form also lacks Δ_x ≥ 0, which the choice of
+//! the direction (4.3.1) implies.
 //!
-//! *Guarantee.* All balls of radius Dist(V) around V + n·e_x, 0 ≤ n ≤ D, are free. Let U be in dual^x+(V). If Δ_x ≤ D, then U is nearer than
-//! Dist(V) to V + Δ_x·e_x. Else its distance to V + D·e_x is Δ_x − D + |Δ_y| + |Δ_z| < Dist(V). So U is free; and bringing
-//! U nearer to V on any axis keeps it in the zone: the free cuboid property. A walk that is cut off at 255 steps or at the
-//! border is a shorter walk.
+//! *Guarantee.* All balls of radius Dist(V) around V + n·e_x, 0 ≤ n ≤ D, are free. Let U be in dual^x+(V). If Δ_x ≤ D,
+//! then U is nearer than Dist(V) to V + Δ_x·e_x. Else its distance to V + D·e_x is Δ_x − D + |Δ_y| + |Δ_z| < Dist(V).
+//! So U is free; and bringing U nearer to V on any axis keeps it in the zone: the free cuboid property. A walk that is
+//! cut off at 255 steps or at the border is a shorter walk.
 //!
-//! *Cost.* 7·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform, then one pass a direction. Dist changes by at
-//! most 1 between neighbours, so a walk ends at the first voxel ahead with Dist(V) − 1: a table of where each value was seen last answers
-//! that without searching.
+//! *Cost.* 7·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform, then one pass a direction.
+//! Dist changes by at most 1 between neighbours, so a walk ends at the first voxel ahead with Dist(V) − 1: a table of
+//! where each value was seen last answers that without searching.
 //!
 //! *Limits.* As `ndf`: a near wall on any side makes the zone thin; but it remains long.
 
@@ -90,7 +91,8 @@ impl Dual {
         Self { resolution, values }
     }
 
-    /// Dist: the Manhattan distance to the nearest occupied voxel, in voxels, at most 255; 0 for a voxel that the grid does not have.
+    /// Dist: the Manhattan distance to the nearest occupied voxel, in voxels, at most 255; 0 for a voxel that the grid
+    /// does not have.
     #[must_use]
     pub fn distance(&self, voxel: Voxel) -> u8 {
         if self.resolution.contains(voxel) { self.distance_at(voxel) } else { 0 }
@@ -103,8 +105,8 @@ impl Dual {
         self.values.get(self.resolution.linear_index(voxel)).copied().unwrap_or(0)
     }
 
-    /// D: how many steps in a direction Dist does not fall below its value here, at most 255; 0 for an occupied voxel and for one that
-    /// the grid does not have. Directions 0 to 5 are x+, x−, y+, y−, z+, z−.
+    /// D: how many steps in a direction Dist does not fall below its value here, at most 255; 0 for an occupied voxel
+    /// and for one that the grid does not have. Directions 0 to 5 are x+, x−, y+, y−, z+, z−.
     #[must_use]
     pub fn extent(&self, direction: usize, voxel: Voxel) -> u8 {
         if self.resolution.contains(voxel) { self.extent_at(direction, voxel) } else { 0 }
@@ -131,7 +133,8 @@ impl Dual {
         distance < radius || extended(0, a.i, b.i) || extended(1, a.j, b.j) || extended(2, a.k, b.k)
     }
 
-    /// What D must be, from its values in voxels ahead: one step and, where Dist rises, at the end of the next one's walk.
+    /// What D must be, from its values in voxels ahead: one step and, where Dist rises, at the end of the next one's
+    /// walk.
     fn expected_extent(&self, direction: usize, voxel: Voxel) -> u8 {
         let step = FACE_STEPS[direction];
         let ahead = |voxel, n: u8| validate::neighbour(self.resolution, voxel, step.map(|s| s * (i64::from(n) + 1)));

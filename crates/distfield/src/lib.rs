@@ -1,9 +1,10 @@
 //! Distance fields over voxel sets, and the safe zones that prove a segment unoccluded.
 //!
 //! A field knows voxels only. It is built from the occupied voxels; then [`SafeZones::proves`] says of two voxels that
-//! no segment between a point of one and a point of the other can be occluded. Where one of the voxels is asked again and again,
-//! a [`Neighbourhood`] answers with one load: [`SafeNeighbourhood`] with what a field proves, [`ExtendedNeighbourhood`] with all that
-//! a free cuboid can prove. Definitions are those of \[Houska2013\], chapters 3 and 4.
+//! no segment between a point of one and a point of the other can be occluded. Where one of the voxels is asked again
+//! and again, a [`Neighbourhood`] answers with one load: [`SafeNeighbourhood`] with what a field proves,
+//! [`ExtendedNeighbourhood`] with all that a free cuboid can prove. Definitions are those of \[Houska2013\], chapters 3
+//! and 4.
 
 mod amr;
 mod bytes;

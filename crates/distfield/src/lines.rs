@@ -1,7 +1,8 @@
 //! Lines of voxels that follow each other along an axis, for passes that work on whole lines and vectorize.
 //!
-//! Rows of a slice lie behind each other in memory and need no list. Parts of slices do not: they are listed, for blocks of
-//! at least some hundred voxels, so that the list stays small beside the voxels whatever the shape of the grid.
+//! Rows of a slice lie behind each other in memory and need no list. Parts of slices do not: they are listed, for
+//! blocks of at least some hundred voxels, so that the list stays small beside the voxels whatever the shape of the
+//! grid.
 
 use crate::rows::{self, Ways};
 
@@ -69,7 +70,8 @@ pub(crate) fn columns(field: &mut [u8], slice: usize, block: usize) -> Vec<Vec<&
     columns
 }
 
-/// Propagates Manhattan distances along the axis on which the lines follow each other: d = min(d, 1 + d of the line before).
+/// Propagates Manhattan distances along the axis on which the lines follow each other: d = min(d, 1 + d of the line
+/// before).
 pub(crate) fn relax(lines: &mut impl Lines, ways: Ways) {
     if ways != Ways::Plus {
         for n in 1..lines.count() {

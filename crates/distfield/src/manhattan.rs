@@ -2,7 +2,8 @@
 //!
 //! |Δi| + |Δj| + |Δk| is a sum of one term an axis, so its minimum over the occupied voxels is found axis by axis \[Rosenfeld1966\]: first
 //! along the rows, then d(V) = min(d(V), 1 + d(V ∓ e)) up and down along y, then along z. If only one of the two ways
-//! is walked on an axis, only the occupied voxels on that side count. Passes along y and z work on whole rows and vectorize.
+//! is walked on an axis, only the occupied voxels on that side count. Passes along y and z work on whole rows and
+//! vectorize.
 
 use rayon::prelude::*;
 use vdf_voxel::VoxelSet;

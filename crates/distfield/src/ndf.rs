@@ -5,10 +5,11 @@
 //! *Definition.* Dist(V) = min over occupied U of d_CD(U, V); safe(V) = { U : d_CD(U, V) < Dist(V) } (Def. 4 and 8
 //! in \[Houska2013\]). One byte, saturated at 255. Beyond the grid there is nothing: the border is no obstacle.
 //!
-//! *Guarantee.* If d_CD(A, B) < Dist(A), all voxels of the cuboid of A and B are in the open ball around A: they are free.
+//! *Guarantee.* If d_CD(A, B) < Dist(A), all voxels of the cuboid of A and B are in the open ball around A: they are
+//! free.
 //!
-//! *Cost.* X·Y·Z bytes; two loads a query. Two builders give the same bytes: the thesis's wavefront from the occupied voxels
-//! (3.5.3), and sweeps along the axes. [`Ndf::build`] takes the one that was measured to be the faster.
+//! *Cost.* X·Y·Z bytes; two loads a query. Two builders give the same bytes: the thesis's wavefront from the occupied
+//! voxels (3.5.3), and sweeps along the axes. [`Ndf::build`] takes the one that was measured to be the faster.
 //!
 //! *Limits.* One near wall on any side shrinks the zone in all directions. Nothing is proved over 255 voxels or more.
 
@@ -25,7 +26,8 @@ pub enum NdfBuilder {
     /// Sweeps along x, y and z over whole rows. Takes the same time whatever is occupied.
     #[default]
     Sweeps,
-    /// A shell of equal distance a step, 64 voxels a word (3.5.3 in \[Houska2013\]). Takes a time in proportion to the greatest distance.
+    /// A shell of equal distance a step, 64 voxels a word (3.5.3 in \[Houska2013\]). Takes a time in proportion to the
+    /// greatest distance.
     Wavefront,
 }
 
@@ -55,7 +57,8 @@ impl Ndf {
         Self { resolution, distances }
     }
 
-    /// The distance of a voxel from the nearest occupied one, in voxels, at most 255; 0 for a voxel that the grid does not have.
+    /// The distance of a voxel from the nearest occupied one, in voxels, at most 255; 0 for a voxel that the grid does
+    /// not have.
     #[must_use]
     pub fn distance(&self, voxel: Voxel) -> u8 {
         if self.resolution.contains(voxel) { self.at(voxel) } else { 0 }

@@ -1,7 +1,7 @@
 //! Operations on rows of one-byte distances, written so that the compiler vectorizes them.
 //!
-//! All fields saturate at [`FAR`]. For a recurrence d = 1 + min(...) saturating at each step gives min(exact, 255), and a
-//! distance that is too small proves less, never something wrong.
+//! All fields saturate at [`FAR`]. For a recurrence d = 1 + min(...) saturating at each step gives min(exact, 255), and
+//! a distance that is too small proves less, never something wrong.
 
 /// The largest stored distance: "this or more". Also the distance from beyond the grid, where nothing is.
 pub(crate) const FAR: u8 = u8::MAX;
@@ -102,9 +102,9 @@ static EIGHTS: [Eight; 256] = {
 
 /// Writes the distances along a row to its own occupied voxels on the sides `ways`.
 ///
-/// Voxels go by the word, of which the distance at its end is handed on to the next one. A word without an occupied voxel is
-/// a ramp that is copied; of others each byte is looked up. Nothing branches on single bits, so a crowded row takes no
-/// more than two or three times as long as an empty one.
+/// Voxels go by the word, of which the distance at its end is handed on to the next one. A word without an occupied
+/// voxel is a ramp that is copied; of others each byte is looked up. Nothing branches on single bits, so a crowded row
+/// takes no more than two or three times as long as an empty one.
 pub(crate) fn along_row(words: &[u64], row: &mut [u8], ways: Ways) {
     if ways != Ways::Plus {
         let mut last = FAR;
@@ -134,8 +134,8 @@ pub(crate) fn along_row(words: &[u64], row: &mut [u8], ways: Ways) {
     }
 }
 
-/// Writes the distances to the last occupied voxel at or before each of a word's, where `last` is that of the voxel before
-/// the word; gives that of its last voxel.
+/// Writes the distances to the last occupied voxel at or before each of a word's, where `last` is that of the voxel
+/// before the word; gives that of its last voxel.
 #[inline]
 fn forwards(word: u64, last: u8, voxels: &mut [u8; WORD]) -> u8 {
     if word == 0 {

@@ -1,4 +1,5 @@
-//! The builders of `ndf` give the same bytes, which validation proves to be the definition, on grids of all shapes and densities.
+//! The builders of `ndf` give the same bytes, which validation proves to be the definition, on grids of all shapes and
+//! densities.
 
 mod common;
 

@@ -257,7 +257,8 @@ fn printed_dual_extent(dual: &Dual, a: Voxel, b: Voxel) -> bool {
     })
 }
 
-/// Does the segment between the centres of two voxels meet the closed voxel `w`: separating axes, in integers, lengths doubled.
+/// Does the segment between the centres of two voxels meet the closed voxel `w`: separating axes, in integers, lengths
+/// doubled.
 fn centres_meet(a: Voxel, b: Voxel, w: Voxel) -> bool {
     let (a, b, w) = (array(a), array(b), array(w));
     let d = AXES.map(|c| 2 * (b[c] - a[c]));
@@ -327,8 +328,8 @@ fn validation_finds_a_field_of_other_occluders() {
     }
 }
 
-/// A long thin grid takes about as long as a cube with as many voxels, and so does each of its orientations. (Clearing a table of
-/// 256 KiB for each slice of 64 voxels took 50 times as long.)
+/// A long thin grid takes about as long as a cube with as many voxels, and so does each of its orientations. (Clearing
+/// a table of 256 KiB for each slice of 64 voxels took 50 times as long.)
 #[test]
 fn thin_grids_take_no_longer_than_cubes() {
     let seconds = |x, y, z| {

@@ -1,7 +1,7 @@
 //! Building what a method needs: voxels, a distance field, a prover for each light; within a limit of memory.
 //!
-//! The voxels and the field must fit, or nothing is built. Then lights get their provers in the order of their list, as long as these fit;
-//! the lights that are left ask the field. All sizes are known before anything is allocated.
+//! The voxels and the field must fit, or nothing is built. Then lights get their provers in the order of their list, as
+//! long as these fit; the lights that are left ask the field. All sizes are known before anything is allocated.
 
 use std::time::Instant;
 
@@ -26,8 +26,8 @@ pub struct ProverOptions {
     pub voxel_size: f64,
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
-    /// The most memory in bytes that the voxels, the field and all neighbourhoods may take together. Building takes some more for a
-    /// while: for each thread that builds the neighbourhood of an area light three bits a voxel.
+    /// The most memory in bytes that the voxels, the field and all neighbourhoods may take together. Building takes
+    /// some more for a while: for each thread that builds the neighbourhood of an area light three bits a voxel.
     pub max_bytes: u64,
 }
 
@@ -116,12 +116,12 @@ impl BuildReport {
 }
 
 impl Provers {
-    /// Builds what `options.method` needs for the occluders `triangles` and these lights, in a grid that covers `bounds`, which must
-    /// hold all occluders. Runs on the current rayon pool.
+    /// Builds what `options.method` needs for the occluders `triangles` and these lights, in a grid that covers
+    /// `bounds`, which must hold all occluders. Runs on the current rayon pool.
     ///
     /// # Errors
-    /// If the voxel size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and field
-    /// `options.max_bytes`. A neighbourhood that exceeds `max_bytes` is no error: see [`LightReport::fallback`].
+    /// If the voxel size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and
+    /// field `options.max_bytes`. A neighbourhood that exceeds `max_bytes` is no error: see [`LightReport::fallback`].
     pub fn build(
         options: &ProverOptions,
         triangles: &[Triangle],

@@ -23,9 +23,9 @@ impl VoxelGrid {
     ///
     /// # Guarantee
     /// Clipping is rounded outwards: ends are clipped to the grid enlarged by 128uG voxels and then move apart by as
-    /// much, with G the largest of 1, the resolution and the grid coordinates of the ends. So `Outside` is certain, and the
-    /// spanned cuboid holds the true part of the segment without the help of the dilation, however far away an end is.
-    /// `docs/numerics.md` has the derivation.
+    /// much, with G the largest of 1, the resolution and the grid coordinates of the ends. So `Outside` is certain, and
+    /// the spanned cuboid holds the true part of the segment without the help of the dilation, however far away an end
+    /// is. `docs/numerics.md` has the derivation.
     #[must_use]
     #[inline]
     pub fn voxel_span(&self, a: DVec3, b: DVec3) -> Span {

@@ -40,8 +40,8 @@ impl fmt::Display for Voxel {
     }
 }
 
-/// A point in grid coordinates: in voxels, from the grid's origin. Points in world units are plain [`DVec3`]s, so that the
-/// two cannot be mixed up; only [`VoxelGrid::grid_coordinates`] leads from one to the other.
+/// A point in grid coordinates: in voxels, from the grid's origin. Points in world units are plain [`DVec3`]s, so that
+/// the two cannot be mixed up; only [`VoxelGrid::grid_coordinates`] leads from one to the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GridPoint(pub(crate) DVec3);
 
@@ -199,12 +199,12 @@ impl VoxelGrid {
         })
     }
 
-    /// [`Self::covering`] with a limit of memory: `bytes` says what will be stored for a grid of a resolution, and must not grow when a
-    /// side of the grid shrinks.
+    /// [`Self::covering`] with a limit of memory: `bytes` says what will be stored for a grid of a resolution, and must
+    /// not grow when a side of the grid shrinks.
     ///
     /// # Errors
-    /// Those of [`Self::covering`], and [`VoxelError::TooMuchMemory`] if `bytes` gives more than `max_bytes`; that names a size that
-    /// works and is the smallest but for rounding to three digits.
+    /// Those of [`Self::covering`], and [`VoxelError::TooMuchMemory`] if `bytes` gives more than `max_bytes`; that
+    /// names a size that works and is the smallest but for rounding to three digits.
     pub fn covering_within(
         min: DVec3,
         max: DVec3,
@@ -268,8 +268,8 @@ impl VoxelGrid {
     }
 
     /// The voxel nearest to `point`: the one that holds it, or one at the border if the point is outside the grid. A
-    /// coordinate that is not a number counts as the least. Clamping is done in grid coordinates, so it does not depend on
-    /// where in the world the grid lies.
+    /// coordinate that is not a number counts as the least. Clamping is done in grid coordinates, so it does not depend
+    /// on where in the world the grid lies.
     #[must_use]
     pub fn nearest_voxel(&self, point: DVec3) -> Voxel {
         self.truncated(self.grid_coordinates(point))
@@ -284,9 +284,9 @@ impl VoxelGrid {
 
     /// δ, in voxels: voxelization treats a voxel as if it were larger by δ on each side.
     ///
-    /// δ = 2⁻⁴⁷·(1 + M), which is 64·u·(1 + M) with the unit roundoff u = 2⁻⁵³ and M = (|x|max + |o|max) / s, the bound of
-    /// grid coordinates. It covers the rounding of end points (20u·(1 + M)), of vertices (4u·(1 + M)) and
-    /// of the voxelization itself (the rest). `docs/numerics.md` has the derivation.
+    /// δ = 2⁻⁴⁷·(1 + M), which is 64·u·(1 + M) with the unit roundoff u = 2⁻⁵³ and M = (|x|max + |o|max) / s, the bound
+    /// of grid coordinates. It covers the rounding of end points (20u·(1 + M)), of vertices (4u·(1 + M)) and of the
+    /// voxelization itself (the rest). `docs/numerics.md` has the derivation.
     ///
     /// Because a voxel spans at least four `f32` steps, M ≤ 2²³ and δ ≤ 2⁻²³ voxels: proofs lose next to nothing.
     #[must_use]
@@ -345,8 +345,8 @@ fn smallest_usable(extent: DVec3, finest: f64, budget: u64) -> f64 {
     smallest_that_fits(finest, extent.max_element(), |size| count(extent, size) <= budget as f64)
 }
 
-/// The smallest size that is at least `finest` and fits, rounded up to three digits. What fits must fit in larger voxels, too, and
-/// anything fits in voxels of the size `largest`.
+/// The smallest size that is at least `finest` and fits, rounded up to three digits. What fits must fit in larger
+/// voxels, too, and anything fits in voxels of the size `largest`.
 fn smallest_that_fits(finest: f64, largest: f64, fits: impl Fn(f64) -> bool) -> f64 {
     let mut size = finest;
     if !fits(size) {

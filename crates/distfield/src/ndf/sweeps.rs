@@ -1,17 +1,20 @@
 //! Chessboard distances by sweeps, axis by axis \[Rosenfeld1966\].
 //!
-//! *Idea.* A shortest chain from an occupied voxel can be walked so that it first stays in its row, then goes on from row to row of its
-//! slice, then from slice to slice, each time without turning back: a step to the next row may also move along x, and a step
-//! to the next slice along x and y. So the distances within rows are found first; then d = min(d, 1 + the least of 3 voxels of
-//! the row before) up and down each slice; then d = min(d, 1 + the least of 3 × 3 voxels of the slice before) up and down the grid.
+//! *Idea.* A shortest chain from an occupied voxel can be walked so that it first stays in its row, then goes on from
+//! row to row of its slice, then from slice to slice, each time without turning back: a step to the next row may also
+//! move along x, and a step to the next slice along x and y. So the distances within rows are found first; then d =
+//! min(d, 1 + the least of 3 voxels of the row before) up and down each slice; then d = min(d, 1 + the least of 3 × 3
+//! voxels of the slice before) up and down the grid.
 //!
-//! *Threads.* The sweeps from slice to slice meet in the middle: while one thread sweeps the lower half upwards, another sweeps the
-//! upper half downwards. After that the two slices at the middle know all of their own half, and each half is swept
-//! the other way, beginning with the slice across the middle. Two threads do both at no extra cost. With more of them, the rows of
-//! a slice are shared out, too, which are independent within a sweep from slice to slice.
+//! *Threads.* The sweeps from slice to slice meet in the middle: while one thread sweeps the lower half upwards,
+//! another sweeps the upper half downwards. After that the two slices at the middle know all of their own half, and
+//! each half is swept the other way, beginning with the slice across the middle. Two threads do both at no extra cost.
+//! With more of them, the rows of a slice are shared out, too, which are independent within a sweep from slice to
+//! slice.
 //!
-//! *Cost.* Two passes over the field, in both of which the slice before is still in the cache, and two slices of scratch. All loops are over
-//! whole rows and vectorize. Along x nothing is swept: the distances within a row are ramps that are copied.
+//! *Cost.* Two passes over the field, in both of which the slice before is still in the cache, and two slices of
+//! scratch. All loops are over whole rows and vectorize. Along x nothing is swept: the distances within a row are ramps
+//! that are copied.
 
 use rayon::prelude::*;
 use vdf_voxel::VoxelSet;
@@ -126,7 +129,8 @@ struct Sweep {
 }
 
 impl Sweep {
-    /// Sweeps slices towards greater z, beginning with the slice `before` them. Each is given to `start` first, with its number.
+    /// Sweeps slices towards greater z, beginning with the slice `before` them. Each is given to `start` first, with
+    /// its number.
     fn up(self, slices: &mut [u8], before: Option<&[u8]>, start: impl Fn(usize, &mut [u8], &mut Padded)) {
         let mut padded = Padded::new(self.width);
         for k in 0..slices.len() / self.slice {
@@ -140,7 +144,8 @@ impl Sweep {
         }
     }
 
-    /// Sweeps slices towards smaller z, beginning with the slice `after` them. Each is given to `start` first, with its number.
+    /// Sweeps slices towards smaller z, beginning with the slice `after` them. Each is given to `start` first, with its
+    /// number.
     fn down(self, slices: &mut [u8], after: Option<&[u8]>, start: impl Fn(usize, &mut [u8], &mut Padded)) {
         let mut padded = Padded::new(self.width);
         for k in (0..slices.len() / self.slice).rev() {

@@ -1,14 +1,14 @@
 //! Chessboard distances by a wavefront from the occupied voxels (3.5.3 in \[Houska2013\]), 64 voxels at a time.
 //!
-//! *Idea.* Let R(r) be the set of the voxels within distance r of an occupied one. R(0) is the occupied set, and R(r + 1) is R(r) and all 26
-//! neighbours of its voxels: a dilation along x, y and z, which are shifts and ORs of whole words. The voxels of R(r + 1) that
-//! are not in R(r) are the shell at distance r + 1, and each is written once.
+//! *Idea.* Let R(r) be the set of the voxels within distance r of an occupied one. R(0) is the occupied set, and R(r +
+//! 1) is R(r) and all 26 neighbours of its voxels: a dilation along x, y and z, which are shifts and ORs of whole
+//! words. The voxels of R(r + 1) that are not in R(r) are the shell at distance r + 1, and each is written once.
 //!
 //! *Threads.* A step reads R(r) and writes R(r + 1), so all its slices are independent.
 //!
-//! *Cost.* A step looks at all rows, but works only on those that can change: not full, and with a row that changed in the step
-//! before among itself and its eight neighbours. In a crowded grid a few steps reach everything. In an empty one there are up to 254, and a row is
-//! touched by most of them. Scratch: two sets of voxels and two bytes a row.
+//! *Cost.* A step looks at all rows, but works only on those that can change: not full, and with a row that changed in
+//! the step before among itself and its eight neighbours. In a crowded grid a few steps reach everything. In an empty
+//! one there are up to 254, and a row is touched by most of them. Scratch: two sets of voxels and two bytes a row.
 
 use rayon::prelude::*;
 use vdf_voxel::VoxelSet;
@@ -83,8 +83,8 @@ impl Front {
         Self { reached: vec![0; rows * words], changed: vec![false; rows] }
     }
 
-    /// Writes what the row (j, k) has reached after one more step into `next`, which holds what it had one step ago, and the new
-    /// voxels' distances into `row`. True if there are any.
+    /// Writes what the row (j, k) has reached after one more step into `next`, which holds what it had one step ago,
+    /// and the new voxels' distances into `row`. True if there are any.
     #[inline]
     fn step(
         &self,

@@ -1,23 +1,26 @@
 //! Proofs towards an area light, which is an occluder itself.
 //!
-//! *Idea.* A query to a sampled point on an area light is superficial: one end lies on an occluder, in an occupied voxel, and no field
-//! proves anything there. But the light's own triangles, and what lies so close to it that it shares its voxels (a ceiling), are few.
-//! They are tested exactly; all other occluders are proved away by the neighbourhood of the light's voxel box (4.4.1 in \[Houska2013\]).
+//! *Idea.* A query to a sampled point on an area light is superficial: one end lies on an occluder, in an occupied
+//! voxel, and no field proves anything there. But the light's own triangles, and what lies so close to it that it
+//! shares its voxels (a ceiling), are few. They are tested exactly; all other occluders are proved away by the
+//! neighbourhood of the light's voxel box (4.4.1 in \[Houska2013\]).
 //!
-//! *Definition.* The light's box holds the voxels of its triangles' bounds, widened by a thousandth of a voxel. An occluder is *near* if
-//! its bounds come within a thousandth of a voxel of that box, else *far*. A segment from voxel U to a point in the box is proved
-//! unoccluded if the cuboid of U and the box is free of far occluders, and the segment meets no near one.
+//! *Definition.* The light's box holds the voxels of its triangles' bounds, widened by a thousandth of a voxel. An
+//! occluder is *near* if its bounds come within a thousandth of a voxel of that box, else *far*. A segment from voxel U
+//! to a point in the box is proved unoccluded if the cuboid of U and the box is free of far occluders, and the segment
+//! meets no near one.
 //!
-//! *Guarantee.* Both ends lie in the cuboid, so the segment does, and no far occluder meets it; that no near one does is tested exactly.
-//! So the claim is about *all* occluders, the light's own among them: exactly what the hierarchy answers.
+//! *Guarantee.* Both ends lie in the cuboid, so the segment does, and no far occluder meets it; that no near one does
+//! is tested exactly. So the claim is about *all* occluders, the light's own among them: exactly what the hierarchy
+//! answers.
 //!
-//! *The far occluders' voxels* are those of all occluders, which are known, but for those that only near ones occupy. A far occluder
-//! that shares a voxel with a near one has a box of voxels that meets that one's box; there are few of them. So
-//! the near ones' voxels are removed, and the voxels of those few are put back.
+//! *The far occluders' voxels* are those of all occluders, which are known, but for those that only near ones occupy. A
+//! far occluder that shares a voxel with a near one has a box of voxels that meets that one's box; there are few of
+//! them. So the near ones' voxels are removed, and the voxels of those few are put back.
 //!
-//! *Cost.* For each light one look at the boxes of blocks of occluders, one copy of the occupied voxels, two small voxelizations and one
-//! sweep. A query takes two voxels, one row, and mostly one comparison of boxes: a flat light in front of a flat
-//! ceiling is disjoint from all segments that end before it.
+//! *Cost.* For each light one look at the boxes of blocks of occluders, one copy of the occupied voxels, two small
+//! voxelizations and one sweep. A query takes two voxels, one row, and mostly one comparison of boxes: a flat light in
+//! front of a flat ceiling is disjoint from all segments that end before it.
 //!
 //! *Limits.* None is built if more than [`MOST_NEAR`] triangles are near: then the exact test costs what it would save.
 //! *Deviation from the thesis:* it does not say what becomes of the light's own triangles, nor of others in its voxels.
@@ -31,8 +34,9 @@ use vdf_voxel::{Voxel, VoxelError, VoxelGrid, VoxelSet, voxel_bounds, voxelize};
 /// The largest number of near triangles.
 const MOST_NEAR: usize = 64;
 
-/// By how much the light is widened to its box, and how far from the box an occluder has to be to be far, in voxels. More than the lift of
-/// sampled points and than the dilation of occupied voxels; were it less, proofs would be lost but none would be wrong.
+/// By how much the light is widened to its box, and how far from the box an occluder has to be to be far, in voxels.
+/// More than the lift of sampled points and than the dilation of occupied voxels; were it less, proofs would be lost
+/// but none would be wrong.
 const MARGIN: f64 = 1e-3;
 
 /// Occluders that are passed over together.
@@ -265,7 +269,8 @@ mod tests {
         assert!(build(&grid(0.3), &triangles, &[]).is_none());
     }
 
-    /// The voxels of the far occluders are those of a voxelization of the far ones alone, the slow twin, wherever the light is.
+    /// The voxels of the far occluders are those of a voxelization of the far ones alone, the slow twin, wherever the
+    /// light is.
     #[test]
     fn far_voxels_equal_those_of_the_far_occluders() {
         let mut put_back = 0;

@@ -1,13 +1,14 @@
-//! Voxelization by the separating-axis test of a triangle and dilated unit cubes, prepared for many cubes of one triangle.
+//! Voxelization by the separating-axis test of a triangle and dilated unit cubes, prepared for many cubes of one
+//! triangle.
 //!
 //! A closed triangle and a closed box are disjoint iff one of 13 axes separates them: the 3 axes of the box, the normal
-//! of the triangle, and the 9 products of a box axis and an edge (Akenine-Möller). The products with one box axis live in
-//! the projection along it, so they are 2D edge tests (Schwarz and Seidel 2010).
+//! of the triangle, and the 9 products of a box axis and an edge (Akenine-Möller). The products with one box axis live
+//! in the projection along it, so they are 2D edge tests (Schwarz and Seidel 2010).
 //!
-//! Here every axis, the normal included, keeps the interval of *all three* projected vertices. For soundness an
-//! axis then may be anything: the exactly computed or a badly cancelled normal of a sliver, or the zero vector of a
-//! degenerate triangle, which separates nothing. Points and segments need no special case: the remaining axes are exactly
-//! those that they require.
+//! Here every axis, the normal included, keeps the interval of *all three* projected vertices. For soundness an axis
+//! then may be anything: the exactly computed or a badly cancelled normal of a sliver, or the zero vector of a
+//! degenerate triangle, which separates nothing. Points and segments need no special case: the remaining axes are
+//! exactly those that they require.
 
 use glam::DVec3;
 

@@ -151,7 +151,8 @@ proptest! {
         }
     }
 
-    /// Vertices far outside the grid round by more than the grid's own dilation. The middle of an edge is known exactly.
+    /// Vertices far outside the grid round by more than the grid's own dilation. The middle of an edge is known
+    /// exactly.
     #[test]
     fn points_of_triangles_that_reach_far(
         size in prop::sample::select(vec![3.0, 7.0, 0.7]),
