@@ -1,8 +1,8 @@
 //! Chessboard distances by a wavefront from the occupied voxels (3.5.3 in \[Houska2013\]), 64 voxels at a time.
 //!
-//! *Idea.* Let R(r) be the set of the voxels within distance r of an occupied one. R(0) is the occupied set, and R(r +
-//! 1) is R(r) and all 26 neighbours of its voxels: a dilation along x, y and z, which are shifts and ORs of whole
-//! words. The voxels of R(r + 1) that are not in R(r) are the shell at distance r + 1, and each is written once.
+//! *Idea.* Let R(r) be the set of the voxels within distance r of an occupied one. R(0) is the occupied set. The next
+//! one, R(r + 1), is R(r) and all 26 neighbours of its voxels: a dilation along x, y and z, which are shifts and ORs of
+//! whole words. Its voxels that are not in R(r) are the shell at distance r + 1, and each is written once.
 //!
 //! *Threads.* A step reads R(r) and writes R(r + 1), so all its slices are independent.
 //!
