@@ -3,28 +3,31 @@
 //! *Idea.* A voxel knows eight distances, one for each octant of directions: a wall behind does not shorten
 //! the view ahead.
 //!
-//! *Definition.* dist^oct(V) = min of d_CD(U, V) over the occupied U in the closed octant of V (Def. 9 in \[Houska2013\]);
-//! safe(V) = { U : d_CD(V, U) < dist^oct(V) } for an octant of V that holds U (Def. 10). Where U and V have equal
-//! coordinates several octants hold U. The thesis takes the first; any is sound, so here it is the best. One byte
-//! each, saturated at 255. Beyond the grid there is nothing.
+//! *Definition.* dist^oct(V) = min of d_CD(U, V) over the occupied U in the closed octant of V (Def. 9 in
+//! \[Houska2013\]); safe(V) = { U : d_CD(V, U) < dist^oct(V) } for an octant of V that holds U (Def. 10). Where U and V
+//! have equal coordinates several octants hold U. The thesis takes the first; any is sound, so here it is the best. One
+//! byte each, saturated at 255. Beyond the grid there is nothing.
 //!
 //! *Guarantee.* The cuboid of A and B is in the closed octant of A that holds B and is nowhere farther than B. So if
 //! d_CD(A, B) < dist^oct(A) all of it is free (the free cuboid property, 4.4.1).
 //!
-//! *Cost.* 8·X·Y·Z bytes; two loads a query, up to eight if coordinates are equal. The build is one sweep per octant, in parallel
-//! over octants, against its direction: 0 if occupied, else 1 + the minimum over the 7 neighbours in the octant (4.1).
-//! A row takes the minimum over three finished rows, which vectorizes. By the recurrence these rise by at most 1 from voxel to voxel against the
-//! octant's x, and so does their minimum; so along x nothing is to be swept but the distances to the row's own occupied voxels, which are ramps that are copied.
-//! One plane an octant, not eight bytes a voxel together: measured, that is slower towards point lights (docs/performance.md).
+//! *Cost.* 8·X·Y·Z bytes; two loads a query, up to eight if coordinates are equal. The build is one sweep per octant,
+//! in parallel over octants, against its direction: 0 if occupied, else 1 + the minimum over the 7 neighbours in the
+//! octant (4.1). A row takes the minimum over three finished rows, which vectorizes. By the recurrence these rise by at
+//! most 1 from voxel to voxel against the octant's x, and so does their minimum; so along x nothing is to be swept but
+//! the distances to the row's own occupied voxels, which are ramps that are copied. One plane an octant, not eight
+//! bytes a voxel together: measured, that is slower towards point lights (docs/performance.md).
 //!
-//! *Limits.* Nothing is proved over 255 voxels or more. An occluder in the octant that is beside the segment, not on it, stops
-//! the proof.
+//! *Limits.* Nothing is proved over 255 voxels or more. An occluder in the octant that is beside the segment, not on
+//! it, stops the proof.
 
 use rayon::prelude::*;
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 use crate::{
-    FieldError, SafeZones, chessboard_distance,
+    FieldError, SafeZones,
+    bytes::Bytes,
+    chessboard_distance,
     rows::{self, Ways},
     validate,
 };
@@ -42,7 +45,7 @@ const NAMES: [&str; 8] = ["amr +++", "amr -++", "amr +-+", "amr --+", "amr ++-",
 pub struct Amr {
     resolution: Resolution,
     /// Eight planes of one byte per voxel, in the order of the octants' numbers.
-    distances: Vec<u8>,
+    distances: Bytes,
 }
 
 impl Amr {
@@ -50,7 +53,7 @@ impl Amr {
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut distances = vec![0; 8 * resolution.voxel_count()];
+        let mut distances = Bytes::zeroed(resolution.voxel_count().saturating_mul(8));
         distances
             .par_chunks_exact_mut(resolution.voxel_count())
             .enumerate()
@@ -58,11 +61,17 @@ impl Amr {
         Self { resolution, distances }
     }
 
-    /// The distance to the nearest occupied voxel in an octant, at most 255. The voxel must be one of the grid's.
-    /// Bits 0, 1 and 2 of `octant` are set where it extends towards smaller i, j and k.
+    /// The distance to the nearest occupied voxel in an octant, in voxels, at most 255; 0 for a voxel that the grid
+    /// does not have. Bits 0, 1 and 2 of `octant`, which is below 8, are set where it extends towards smaller i, j and
+    /// k.
     #[must_use]
-    #[inline]
     pub fn distance(&self, octant: usize, voxel: Voxel) -> u8 {
+        if self.resolution.contains(voxel) { self.at(octant, voxel) } else { 0 }
+    }
+
+    /// [`Self::distance`] of one of the grid's voxels.
+    #[inline]
+    fn at(&self, octant: usize, voxel: Voxel) -> u8 {
         debug_assert!(octant < 8 && self.resolution.contains(voxel));
         let index = octant * self.resolution.voxel_count() + self.resolution.linear_index(voxel);
         self.distances.get(index).copied().unwrap_or(0)
@@ -72,9 +81,9 @@ impl Amr {
     #[inline(never)]
     fn proves_tie(&self, a: Voxel, b: Voxel, ties: usize, distance: u32) -> bool {
         let octant = octant_of(a, b);
-        (0..8).filter(|other| (other ^ octant) & !ties == 0).any(|other| {
-            distance < u32::from(self.distance(other, a)) || distance < u32::from(self.distance(other ^ 7, b))
-        })
+        (0..8)
+            .filter(|other| (other ^ octant) & !ties == 0)
+            .any(|other| distance < u32::from(self.at(other, a)) || distance < u32::from(self.at(other ^ 7, b)))
     }
 }
 
@@ -83,7 +92,7 @@ impl SafeZones for Amr {
     fn proves(&self, a: Voxel, b: Voxel) -> bool {
         let distance = chessboard_distance(a, b);
         let octant = octant_of(a, b);
-        if distance < u32::from(self.distance(octant, a)) || distance < u32::from(self.distance(octant ^ 7, b)) {
+        if distance < u32::from(self.at(octant, a)) || distance < u32::from(self.at(octant ^ 7, b)) {
             return true;
         }
         let ties = number(a.i == b.i, a.j == b.j, a.k == b.k);
@@ -128,38 +137,48 @@ fn number(x: bool, y: bool, z: bool) -> usize {
 
 /// Fills one octant's plane, beginning at the corner of the grid that the octant points to.
 fn sweep(occupied: &VoxelSet, octant: usize, plane: &mut [u8]) {
-    let Resolution { x, y, z } = occupied.resolution();
-    let width = x as usize;
+    let [width, height, depth] = occupied.resolution().sides().map(|n| n as usize);
+    let slice_len = width * height;
     let (ways, ahead) = if octant & MINUS_X == 0 { (Ways::Plus, 2) } else { (Ways::Minus, 0) };
-    // The least of the two finished rows ahead on y, in this slice and in the one before.
-    let mut finished = vec![rows::FAR; width];
-    // The least of these and the row ahead on z, between what is beyond the grid.
+    let nothing = vec![rows::FAR; slice_len];
+    // The least of the three finished rows ahead on y and z, between what is beyond the grid.
     let mut nearest = vec![rows::FAR; width + 2];
-    for step_k in 0..z {
-        let k = if octant & MINUS_Z == 0 { z - 1 - step_k } else { step_k };
-        let next_k = (step_k > 0).then(|| if octant & MINUS_Z == 0 { k + 1 } else { k - 1 });
-        finished.fill(rows::FAR);
-        for step_j in 0..y {
-            let j = if octant & MINUS_Y == 0 { y - 1 - step_j } else { step_j };
-            let start = |k: u32| (j as usize + y as usize * k as usize) * width;
-            match next_k {
-                Some(next) => nearest[1..=width].copy_from_slice(&plane[start(next)..start(next) + width]),
-                None => nearest.fill(rows::FAR),
+    for step_k in 0..depth {
+        let k = if octant & MINUS_Z == 0 { depth - 1 - step_k } else { step_k };
+        let (slice, next_slice) = with_ahead(plane, k, slice_len, octant & MINUS_Z != 0);
+        let next_slice = next_slice.unwrap_or(&nothing);
+        for step_j in 0..height {
+            let j = if octant & MINUS_Y == 0 { height - 1 - step_j } else { step_j };
+            let (row, next_row) = with_ahead(slice, j, width, octant & MINUS_Y != 0);
+            let of_next = |j: usize| next_slice.get(j * width..(j + 1) * width);
+            let diagonal = if octant & MINUS_Y == 0 { of_next(j + 1) } else { j.checked_sub(1).and_then(of_next) };
+            let nothing = &nothing[..width];
+            let finished =
+                next_row.unwrap_or(nothing).iter().zip(of_next(j).unwrap_or(nothing)).zip(diagonal.unwrap_or(nothing));
+            for (nearest, ((&on_y, &on_z), &on_both)) in nearest[1..].iter_mut().zip(finished) {
+                *nearest = on_y.min(on_z).min(on_both);
             }
-            for (nearest, finished) in nearest[1..].iter_mut().zip(&mut finished) {
-                let next = *nearest;
-                *nearest = next.min(*finished);
-                *finished = next;
-            }
-            let row = &mut plane[start(k)..start(k) + width];
-            // Finished rows obey the recurrence, so along x only the distances to the row's own occupied voxels are still to spread.
-            rows::along_row(occupied.row(j, k), row, ways);
+            // Finished rows obey the recurrence, so along x only the distances to the row's own occupied voxels are
+            // still to spread.
+            rows::along_row(occupied.row(j as u32, k as u32), row, ways);
             let nearest = nearest[1..].iter().zip(&nearest[ahead..]);
-            for ((distance, finished), (&beside, &ahead)) in row.iter_mut().zip(&mut finished).zip(nearest) {
+            for (distance, (&beside, &ahead)) in row.iter_mut().zip(nearest) {
                 *distance = beside.min(ahead).saturating_add(1).min(*distance);
-                *finished = (*finished).min(*distance);
             }
         }
+    }
+}
+
+/// Line `n` of lines that lie behind each other, and the finished line ahead of it, which is the one before if the
+/// sweep goes `up`.
+#[inline]
+fn with_ahead(lines: &mut [u8], n: usize, len: usize, up: bool) -> (&mut [u8], Option<&[u8]>) {
+    if up {
+        let (done, rest) = lines.split_at_mut(n * len);
+        (&mut rest[..len], done.len().checked_sub(len).map(|last| &done[last..]))
+    } else {
+        let (rest, done) = lines.split_at_mut((n + 1) * len);
+        (&mut rest[n * len..], done.get(..len))
     }
 }
 

@@ -1,35 +1,41 @@
 //! The directed safe zones, `dsz`.
 //!
-//! *Idea.* A segment that leaves its voxel through one face never comes back: only what lies beyond that face matters. So a voxel
-//! knows six distances, one for each face.
+//! *Idea.* A segment that leaves its voxel through one face never comes back: only what lies beyond that face matters.
+//! So a voxel knows six distances, one for each face.
 //!
-//! *Definition.* dist^x+(V) = min of d_Man(U, V) over the occupied U with U_x > V_x, and so for the other five faces (Def. 11 in
-//! \[Houska2013\]); safe^x+(V) = { U : d_Man(U, V) < dist^x+(V), U_x > V_x } (Def. 12). B is in safe(A) if A is free and B is
-//! in the safe zones of *all* faces of A that look towards B; A itself is in safe(A) if it is free.
+//! *Definition.* dist^x+(V) = min of d_Man(U, V) over the occupied U with U_x > V_x, and so for the other five faces
+//! (Def. 11 in \[Houska2013\]); safe^x+(V) = { U : d_Man(U, V) < dist^x+(V), U_x > V_x } (Def. 12). B is in safe(A) if
+//! A is free and B is in the safe zones of *all* faces of A that look towards B; A itself is in safe(A) if it is free.
 //!
 //! *Which face.* The thesis takes the face through which the ray leaves A (4.2.2), and a ray through an edge could take
 //! either. A query here names voxels, and stands for all segments between their points. On each axis on which B differs
-//! from A some of these begin on the face towards B and leave through it at once; so each such face is a candidate,
-//! and only the smallest of their distances is safe. On an axis without difference no segment leaves. To know the face one needs the
-//! points: that would prove more, but it needs its own bound of rounding errors next to edges, it loses the free cuboid, on
-//! which the voxelization's promise rests, and safe neighbourhoods, which know voxels only, could not use it.
+//! from A some of these begin on the face towards B and leave through it at once; so each such face is a candidate, and
+//! only the smallest of their distances is safe. On an axis without difference no segment leaves. To know the face one
+//! needs the points: that would prove more, but it needs its own bound of rounding errors next to edges, it loses the
+//! free cuboid, on which the voxelization's promise rests, and safe neighbourhoods, which know voxels only, could not
+//! use it.
 //!
 //! *Stored form.* dist^x+(V) = 1 + H^x+(V + e_x) with the distance to the *closed* half-space, H^x+(V) = min of
-//! d_Man(U, V) over the occupied U with U_x ≥ V_x. H is stored: it is 0 just for occupied voxels, it is a separable distance
-//! transform, and, unlike dist, it obeys a recurrence between neighbours everywhere, which [`SafeZones::validate`] checks.
+//! d_Man(U, V) over the occupied U with U_x ≥ V_x. H is stored: it is 0 just for occupied voxels, it is a separable
+//! distance transform, and, unlike dist, it obeys a recurrence between neighbours everywhere, which
+//! [`SafeZones::validate`] checks.
 //!
-//! *Guarantee.* Let B be in safe(A). A voxel W ≠ A of their cuboid differs from A on some axis, so it lies strictly beyond
-//! a face of A that looks towards B; and d_Man(W, A) ≤ d_Man(B, A) < dist of that face. So W is free, and A is: the free cuboid property.
+//! *Guarantee.* Let B be in safe(A). A voxel W ≠ A of their cuboid differs from A on some axis, so it lies strictly
+//! beyond a face of A that looks towards B; and d_Man(W, A) ≤ d_Man(B, A) < dist of that face. So W is free, and A is:
+//! the free cuboid property.
 //!
-//! *Cost.* 6·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform a face, each parallel over slices and columns.
+//! *Cost.* 6·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform a face, each parallel over
+//! slices and columns.
 //!
-//! *Limits.* Nothing is proved over 256 voxels or more, in Manhattan distance: a diagonal is three times as long as for `amr`.
-//! Obstacles beside or behind, but beyond one of the faces, stop the proof.
+//! *Limits.* Nothing is proved over 256 voxels or more, in Manhattan distance: a diagonal is three times as long as for
+//! `amr`. Obstacles beside or behind, but beyond one of the faces, stop the proof.
 
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 use crate::{
-    FieldError, SafeZones, manhattan, manhattan_distance,
+    FieldError, SafeZones,
+    bytes::Bytes,
+    manhattan, manhattan_distance,
     rows::Ways,
     validate::{self, FACE_STEPS},
 };
@@ -42,7 +48,7 @@ const NAMES: [&str; 6] = ["dsz x+", "dsz x-", "dsz y+", "dsz y-", "dsz z+", "dsz
 pub struct Dsz {
     resolution: Resolution,
     /// Six planes of H, one byte per voxel, in the order of the faces' numbers.
-    distances: Vec<u8>,
+    distances: Bytes,
 }
 
 impl Dsz {
@@ -50,7 +56,7 @@ impl Dsz {
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut distances = vec![0; 6 * resolution.voxel_count()];
+        let mut distances = Bytes::zeroed(resolution.voxel_count().saturating_mul(6));
         for (plane, step) in distances.chunks_exact_mut(resolution.voxel_count()).zip(FACE_STEPS) {
             let ways = step.map(|s| match s {
                 0 => Ways::Both,
@@ -62,19 +68,23 @@ impl Dsz {
         Self { resolution, distances }
     }
 
-    /// H: the Manhattan distance to the nearest occupied voxel that is not behind `voxel` as seen in the direction
-    /// of a face, at most 255. Faces 0 to 5 look towards x+, x−, y+, y−, z+, z−. The voxel must be one of the grid's.
+    /// H: the Manhattan distance to the nearest occupied voxel that is not behind `voxel` as seen in the direction of a
+    /// face, in voxels, at most 255. Faces 0 to 5 look towards x+, x−, y+, y−, z+, z−. 0 for a voxel that the grid does
+    /// not have.
     #[must_use]
-    #[inline]
     pub fn half_space_distance(&self, face: usize, voxel: Voxel) -> u8 {
-        debug_assert!(face < 6 && self.resolution.contains(voxel));
-        self.plane_value(face, self.resolution.linear_index(voxel))
+        debug_assert!(face < 6);
+        if self.resolution.contains(voxel) { self.plane_value(face, self.resolution.linear_index(voxel)) } else { 0 }
     }
 
-    /// dist of Def. 11: the Manhattan distance to the nearest occupied voxel strictly beyond a face, at most 256. Faces as in
-    /// [`Dsz::half_space_distance`]. The voxel must be one of the grid's; here it does not matter whether it is occupied.
+    /// dist of Def. 11: the Manhattan distance to the nearest occupied voxel strictly beyond a face, at most 256. Faces
+    /// as in [`Dsz::half_space_distance`]. Here it does not matter whether the voxel is occupied. 0 for one that the
+    /// grid does not have.
     #[must_use]
     pub fn distance(&self, face: usize, voxel: Voxel) -> u16 {
+        if !self.resolution.contains(voxel) {
+            return 0;
+        }
         let beyond = validate::neighbour(self.resolution, voxel, FACE_STEPS[face]);
         1 + beyond.map_or(u16::from(u8::MAX), |next| self.half_space_distance(face, next).into())
     }
@@ -88,7 +98,7 @@ impl Dsz {
     #[inline]
     fn reaches(&self, a: Voxel, b: Voxel, distance: u32) -> bool {
         let index = self.resolution.linear_index(a);
-        let row = self.resolution.x as usize;
+        let row = self.resolution.x() as usize;
         // d_Man < 1 + H of the next voxel; where the coordinates differ there is a next one.
         let beyond = |axis: usize, from: u32, to: u32, stride: usize| match from.cmp(&to) {
             std::cmp::Ordering::Less => distance <= self.plane_value(2 * axis, index + stride).into(),
@@ -98,7 +108,7 @@ impl Dsz {
         self.plane_value(0, index) != 0
             && beyond(0, a.i, b.i, 1)
             && beyond(1, a.j, b.j, row)
-            && beyond(2, a.k, b.k, row * self.resolution.y as usize)
+            && beyond(2, a.k, b.k, row * self.resolution.y() as usize)
     }
 }
 

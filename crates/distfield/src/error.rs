@@ -7,10 +7,7 @@ use vdf_voxel::{Resolution, Voxel};
 #[non_exhaustive]
 pub enum FieldError {
     /// The set of occupied voxels belongs to another grid.
-    #[error(
-        "the field has {} x {} x {} voxels, the occupied set {} x {} x {}: validate against the set it was built from",
-        found.x, found.y, found.z, expected.x, expected.y, expected.z
-    )]
+    #[error("the field has {found} voxels, the occupied set {expected}: validate against the set it was built from")]
     Resolution {
         /// The resolution of the occupied set.
         expected: Resolution,

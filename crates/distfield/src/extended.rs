@@ -1,33 +1,38 @@
 //! Extended safe neighbourhoods, the suffix `-xsn`.
 //!
-//! *Idea.* What makes a proof is a free cuboid between the two ends. For one light all such cuboids can be found at once, without any
-//! distance field.
+//! *Idea.* What makes a proof is a free cuboid between the two ends. For one light all such cuboids can be found at
+//! once, without any distance field.
 //!
-//! *Definition.* For a box of voxels L, the light's: neigh⁺(L) = { U : the smallest box that holds U and L has no occupied voxel }. For a point
-//! light L is one voxel V, and the box that holds U and V is their cuboid: the largest neighbourhood with the free cuboid
-//! property (4.4.1 in \[Houska2013\]). For an area light L must hold all of it; its own voxels are occupied by itself, so
-//! the occupied set to pass is that of the *other* occluders. If L is partly outside the grid, or an occupied voxel is in it, the set is empty.
+//! *Definition.* For a box of voxels L, the light's: neigh⁺(L) = { U : the smallest box that holds U and L has no
+//! occupied voxel }. For a point light L is one voxel V, and the box that holds U and V is their cuboid: the largest
+//! neighbourhood with the free cuboid property (4.4.1 in \[Houska2013\]). For an area light L must hold all of it; its
+//! own voxels are occupied by itself, so the occupied set to pass is that of the *other* occluders. If L is partly
+//! outside the grid, or an occupied voxel is in it, the set is empty.
 //!
-//! *Guarantee.* A segment from a point of U to a point of L stays in the box that holds both. It contains the safe neighbourhood of every field with
-//! the free cuboid property.
+//! *Guarantee.* A segment from a point of U to a point of L stays in the box that holds both. It contains the safe
+//! neighbourhood of every field with the free cuboid property.
 //!
-//! *The sweep.* First let L be one voxel V. U is in the set S iff U is free and, for each axis on which U differs from V, its neighbour one
-//! step towards V is in S: a voxel W ≠ U of the cuboid of U and V differs from U on some axis, there it is nearer to V, and so it is in the
-//! cuboid of that neighbour and V. So S is found by one sweep outwards from V, in any order that visits those neighbours first.
-//! Now let L be a box. Merge the columns that L covers on the x axis into one column, its rows and its slices likewise, and call a merged voxel
-//! occupied if one of its parts is. The smallest box that holds L and U is then the cuboid of the merged L and the merged U, and it has an
-//! occupied voxel iff its merged image has one. So the sweep from one voxel solves it, and all parts of a merged voxel get its answer.
+//! *The sweep.* First let L be one voxel V. U is in the set S iff U is free and, for each axis on which U differs from
+//! V, its neighbour one step towards V is in S: a voxel W ≠ U of the cuboid of U and V differs from U on some axis,
+//! there it is nearer to V, and so it is in the cuboid of that neighbour and V. So S is found by one sweep outwards
+//! from V, in any order that visits those neighbours first. Now let L be a box. Merge the columns that L covers on the
+//! x axis into one column, its rows and its slices likewise, and call a merged voxel occupied if one of its parts is.
+//! The smallest box that holds L and U is then the cuboid of the merged L and the merged U, and it has an occupied
+//! voxel iff its merged image has one. So the sweep from one voxel solves it, and all parts of a merged voxel get its
+//! answer.
 //!
-//! *Rows.* Along a row, S begins at L and goes on both ways through free voxels, as far as the rows one step
-//! towards L let it: it is one run. So the sweep goes from row to row, intersects two runs and cuts them at the next occupied bit on either side, 64
-//! voxels a word; and S is stored as its runs, which is all there is to know.
+//! *Rows.* Along a row, S begins at L and goes on both ways through free voxels, as far as the rows one step towards L
+//! let it: it is one run. So the sweep goes from row to row, intersects two runs and cuts them at the next occupied bit
+//! on either side, 64 voxels a word; and S is stored as its runs, which is all there is to know.
 //!
-//! *Cost.* 8 bytes a row for each light, and one load a query. The build reads each bit of the occupied set at most twice.
+//! *Cost.* 8 bytes a row for each light, and one load a query. The build reads each bit of the occupied set at most
+//! twice.
 //!
-//! *Departure.* The thesis scans lanes in two phases, in two dimensions (4.4.1), and sweeps an area light's projections along its
-//! normal; the definition here has no normal, so it is the same on both sides of the light.
+//! *Departure.* The thesis scans lanes in two phases, in two dimensions (4.4.1), and sweeps an area light's projections
+//! along its normal; the definition here has no normal, so it is the same on both sides of the light.
 //!
-//! *Limits.* One set per light. A voxel whose cuboid is not free is left open even if all of the light can be seen from it.
+//! *Limits.* One set per light. A voxel whose cuboid is not free is left open even if all of the light can be seen from
+//! it.
 
 use std::{borrow::Cow, ops::RangeInclusive};
 
@@ -52,20 +57,20 @@ struct Run {
 }
 
 impl ExtendedNeighbourhood {
-    /// The extended safe neighbourhood of `light`, among these occupied voxels: all voxels U such that the smallest box that holds
-    /// U and `light` has no occupied one. Empty if `light` holds an occupied voxel or one outside the grid. For an area light pass the
-    /// voxels of the other occluders.
+    /// The extended safe neighbourhood of `light`, among these occupied voxels: all voxels U such that the smallest box
+    /// that holds U and `light` has no occupied one. Empty if `light` holds an occupied voxel or one outside the grid.
+    /// For an area light pass the voxels of the other occluders.
     #[must_use]
     pub fn new(occupied: &VoxelSet, light: VoxelBox) -> Self {
         let resolution = occupied.resolution();
-        let height = resolution.y as usize;
-        let mut rows = vec![Run::EMPTY; height * resolution.z as usize];
+        let height = resolution.y() as usize;
+        let mut rows = vec![Run::EMPTY; height * resolution.z() as usize];
         let at = |j: u32, k: u32| j as usize + height * k as usize;
         let (min, max) = (light.min(), light.max());
         if resolution.contains(max) {
-            for (slices, towards_k) in outwards(min.k, max.k, resolution.z) {
-                for (lines, towards_j) in outwards(min.j, max.j, resolution.y) {
-                    let mut run = Run { first: 0, end: resolution.x };
+            for (slices, towards_k) in outwards(min.k, max.k, resolution.z()) {
+                for (lines, towards_j) in outwards(min.j, max.j, resolution.y()) {
+                    let mut run = Run { first: 0, end: resolution.x() };
                     if let Some(k) = towards_k {
                         run = run.intersection(rows[at(*lines.start(), k)]);
                     }
@@ -86,10 +91,23 @@ impl ExtendedNeighbourhood {
         Self { resolution, light, rows }
     }
 
+    /// The memory of a neighbourhood in such a grid, in bytes; `u64::MAX` if it is more.
+    #[must_use]
+    pub const fn bytes_of(resolution: Resolution) -> u64 {
+        (resolution.row_count() as u64).saturating_mul(size_of::<Run>() as u64)
+    }
+
     #[inline]
     fn run(&self, j: u32, k: u32) -> Run {
-        let index = j as usize + self.resolution.y as usize * k as usize;
+        let index = j as usize + self.resolution.y() as usize * k as usize;
         self.rows.get(index).copied().unwrap_or(Run::EMPTY)
+    }
+
+    /// The members of the row (·, j, k), as their coordinates i.
+    #[inline]
+    pub(crate) fn members(&self, j: u32, k: u32) -> std::ops::Range<u32> {
+        let Run { first, end } = self.run(j, k);
+        first..end
     }
 
     /// Whether `voxel` must be a member, from the members one step towards the light and the occupied voxels.
@@ -121,7 +139,7 @@ impl Neighbourhood for ExtendedNeighbourhood {
     #[inline]
     fn proves(&self, voxel: Voxel) -> bool {
         let run = self.run(voxel.j, voxel.k);
-        (run.first <= voxel.i) & (voxel.i < run.end) & (voxel.j < self.resolution.y)
+        (run.first <= voxel.i) & (voxel.i < run.end) & (voxel.j < self.resolution.y())
     }
 
     fn voxels(&self) -> Cow<'_, VoxelSet> {
@@ -145,9 +163,9 @@ impl Neighbourhood for ExtendedNeighbourhood {
         size_of_val(self.rows.as_slice())
     }
 
-    /// Checks the resolution, that no member is occupied, and for each voxel that it is a member just if its merged parts are free and
-    /// its neighbours towards the light are members. By induction outwards from the light that proves the definition, in time
-    /// proportional to the number of voxels.
+    /// Checks the resolution, that no member is occupied, and for each voxel that it is a member just if its merged
+    /// parts are free and its neighbours towards the light are members. By induction outwards from the light that
+    /// proves the definition, in time proportional to the number of voxels.
     fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
         validate::same_resolution(self.resolution, occupied)?;
         let members = self.voxels();
@@ -171,7 +189,8 @@ impl Run {
         Self { first: self.first.max(other.first), end: self.end.min(other.end) }
     }
 
-    /// The part of the run that is reached from all of the columns `low` to `high`, which the run must hold, without an occupied voxel.
+    /// The part of the run that is reached from all of the columns `low` to `high`, which the run must hold, without an
+    /// occupied voxel.
     fn free_around(self, occupied: &[u64], low: u32, high: u32) -> Self {
         match last_occupied(occupied, self.first, high) {
             Some(column) if column >= low => Self::EMPTY,
@@ -241,7 +260,7 @@ mod tests {
                     Run { end: run.end + 1, ..run },
                     Run { end: run.end.saturating_sub(1), ..run },
                 ];
-                for changed in changed.into_iter().filter(|c| c.members() != run.members() && c.end <= resolution.x) {
+                for changed in changed.into_iter().filter(|c| c.members() != run.members() && c.end <= resolution.x()) {
                     near.rows[n] = changed;
                     assert!(near.validate(&occupied).is_err(), "{light:?}: row {n} is {changed:?}, not {run:?}");
                 }

@@ -2,12 +2,16 @@
 //!
 //! |Δi| + |Δj| + |Δk| is a sum of one term an axis, so its minimum over the occupied voxels is found axis by axis \[Rosenfeld1966\]: first
 //! along the rows, then d(V) = min(d(V), 1 + d(V ∓ e)) up and down along y, then along z. If only one of the two ways
-//! is walked on an axis, only the occupied voxels on that side count. Passes along y and z work on whole rows and vectorize.
+//! is walked on an axis, only the occupied voxels on that side count. Passes along y and z work on whole rows and
+//! vectorize.
 
 use rayon::prelude::*;
 use vdf_voxel::VoxelSet;
 
-use crate::rows::{self, Ways};
+use crate::{
+    lines::{Contiguous, columns, relax},
+    rows::{self, Ways},
+};
 
 /// Voxels of a slice that go along z together: of all slices of a grid of 256³ they fit into the second-level cache.
 const BLOCK: usize = 2048;
@@ -16,41 +20,17 @@ const BLOCK: usize = 2048;
 /// [`rows::FAR`]. In parallel over slices, then over blocks of columns.
 pub(crate) fn distances(occupied: &VoxelSet, ways: [Ways; 3], field: &mut [u8]) {
     let resolution = occupied.resolution();
-    let width = resolution.x as usize;
-    let slice = width * resolution.y as usize;
-    field.par_chunks_exact_mut(slice).zip(0..resolution.z).for_each(|(slice, k)| {
-        for (row, j) in slice.chunks_exact_mut(width).zip(0..resolution.y) {
+    let width = resolution.x() as usize;
+    let slice = width * resolution.y() as usize;
+    field.par_chunks_exact_mut(slice).zip(0..resolution.z()).for_each(|(slice, k)| {
+        for (row, j) in slice.chunks_exact_mut(width).zip(0..resolution.y()) {
             rows::along_row(occupied.row(j, k), row, ways[0]);
         }
-        relax(&mut slice.chunks_exact_mut(width).collect::<Vec<_>>(), ways[1]);
+        relax(&mut Contiguous { voxels: slice, width }, ways[1]);
     });
-    columns(field, slice, BLOCK).into_par_iter().for_each(|mut column| relax(&mut column, ways[2]));
-}
-
-/// Cuts each slice into blocks; gives for each block its part of all slices.
-pub(crate) fn columns(field: &mut [u8], slice: usize, block: usize) -> Vec<Vec<&mut [u8]>> {
-    let mut columns: Vec<Vec<&mut [u8]>> = Vec::new();
-    columns.resize_with(slice.div_ceil(block), Vec::new);
-    for slice in field.chunks_exact_mut(slice) {
-        for (column, part) in columns.iter_mut().zip(slice.chunks_mut(block)) {
-            column.push(part);
-        }
-    }
-    columns
-}
-
-/// Propagates distances along the axis on which `lines` follow each other.
-fn relax(lines: &mut [&mut [u8]], ways: Ways) {
-    if ways != Ways::Plus {
-        for n in 1..lines.len() {
-            let (done, rest) = lines.split_at_mut(n);
-            rows::relax(rest[0], done[n - 1]);
-        }
-    }
-    if ways != Ways::Minus {
-        for n in (1..lines.len()).rev() {
-            let (rest, done) = lines.split_at_mut(n);
-            rows::relax(rest[n - 1], done[0]);
-        }
+    if slice <= BLOCK {
+        relax(&mut Contiguous { voxels: field, width: slice }, ways[2]);
+    } else {
+        columns(field, slice, BLOCK).into_par_iter().for_each(|mut column| relax(&mut column, ways[2]));
     }
 }

@@ -1,13 +1,14 @@
 //! Safe neighbourhoods, the suffix `-sn`.
 //!
-//! *Idea.* All queries to a point light end in the same voxel: ask the field once for each voxel and keep the answers as bits.
+//! *Idea.* All queries to a point light end in the same voxel: ask the field once for each voxel and keep the answers
+//! as bits.
 //!
 //! *Definition.* neigh(V) = { U : U in safe(V) or V in safe(U) } (Def. 14 in \[Houska2013\]), over any field.
 //!
 //! *Guarantee.* Exactly the answers of the field, [`SafeZones::proves`]; so its guarantee.
 //!
-//! *Cost.* X·Y·Z bits per light; one load a query, and the voxel of the light is not needed. The build asks the field for every
-//! voxel, in parallel over slices.
+//! *Cost.* X·Y·Z bits per light; one load a query, and the voxel of the light is not needed. The build asks the field
+//! for every voxel of the extended neighbourhood, which holds this one, in parallel over slices.
 //!
 //! *Limits.* One set per light. A light in an occupied voxel proves nothing.
 
@@ -32,8 +33,8 @@ pub trait Neighbourhood: Sync {
     /// The memory of the neighbourhood in bytes.
     fn bytes(&self) -> usize;
 
-    /// Checks the neighbourhood against the occupied voxels that it was built from, cheap checks first. What that proves,
-    /// the implementations say.
+    /// Checks the neighbourhood against the occupied voxels that it was built from, cheap checks first. What that
+    /// proves, the implementations say.
     ///
     /// # Errors
     /// The first voxel found that is in it and must not be, or the other way round.
@@ -49,18 +50,18 @@ pub struct SafeNeighbourhood {
 
 impl SafeNeighbourhood {
     /// The safe neighbourhood of the voxel `light` in a field that was built from `occupied`; empty if `light` is
-    /// occupied or outside the grid.
+    /// occupied or outside the grid, or if the two are of different grids.
     #[must_use]
     pub fn new<F: SafeZones + ?Sized>(field: &F, occupied: &VoxelSet, light: Voxel) -> Self {
         let resolution = field.resolution();
-        if occupied.contains(light) || !resolution.contains(light) {
+        if resolution != occupied.resolution() || occupied.contains(light) || !resolution.contains(light) {
             return Self { light, voxels: VoxelSet::new(resolution) };
         }
+        // What a field proves has a free cuboid, so it need not be asked about other voxels.
+        let extended = ExtendedNeighbourhood::new(occupied, light.into());
         let voxels = VoxelSet::from_rows(resolution, |j, k, row| {
-            for (word, first) in row.iter_mut().zip((0..resolution.x).step_by(64)) {
-                for i in first..resolution.x.min(first.saturating_add(64)) {
-                    *word |= u64::from(field.proves(light, Voxel::new(i, j, k))) << (i - first);
-                }
+            for i in extended.members(j, k) {
+                row[(i / 64) as usize] |= u64::from(field.proves(light, Voxel::new(i, j, k))) << (i % 64);
             }
         });
         Self { light, voxels }
@@ -85,8 +86,9 @@ impl Neighbourhood for SafeNeighbourhood {
         self.voxels.bytes()
     }
 
-    /// Checks the resolution, that no member is occupied, and that each member and the light span a free cuboid. The last
-    /// proves that no answer is wrong, whatever field it came from; that none is missing, only the field could tell.
+    /// Checks the resolution, that no member is occupied, and that each member and the light span a free cuboid. The
+    /// last proves that no answer is wrong, whatever field it came from; that none is missing, only the field could
+    /// tell.
     fn validate(&self, occupied: &VoxelSet) -> Result<(), FieldError> {
         let resolution = self.voxels.resolution();
         validate::same_resolution(resolution, occupied)?;

@@ -24,8 +24,8 @@ pub trait SafeZones: Sync {
     ///
     /// 1. the resolutions are equal;
     /// 2. a distance is 0 just where a voxel is occupied: proves that no occupied voxel is taken for free;
-    /// 3. each distance is one more than the least of its neighbours' from which it may come, saturated. With 2 this proves
-    ///    that the field is its definition, everywhere: the head of `validate.rs` shows why. The extents of
+    /// 3. each distance is one more than the least of its neighbours' from which it may come, saturated. With 2 this
+    ///    proves that the field is its definition, everywhere: the head of `validate.rs` shows why. The extents of
     ///    [`Dual`](crate::Dual) are checked by a recurrence of their own, to the same effect.
     ///
     /// Takes time proportional to the size of the field, in parallel over slices.

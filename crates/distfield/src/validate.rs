@@ -1,14 +1,15 @@
 //! What the validators of the fields share.
 //!
-//! All distances are of one kind: the length, at most 255, of the shortest chain of steps from a voxel to an occupied one, with steps
-//! to all 26 neighbours (`ndf`), to 7 of them (an octant of `amr`), to the 6 across faces (`dual`) or to 5 of those (a face of
-//! `dsz`). A shortest chain never needs to leave the grid, so its length is the distance of the definition.
+//! All distances are of one kind: the length, at most 255, of the shortest chain of steps from a voxel to an occupied
+//! one, with steps to all 26 neighbours (`ndf`), to 7 of them (an octant of `amr`), to the 6 across faces (`dual`) or
+//! to 5 of those (a face of `dsz`). A shortest chain never needs to leave the grid, so its length is the distance of
+//! the definition.
 //!
-//! *Claim.* If d is 0 just for the occupied voxels, and d(V) = min(255, 1 + min d(V + step)) for every free one, where beyond the grid d is
-//! 255, then d is that length. *Proof.* d(V) is at most the length: along the shortest chain from the occupied voxel back to V the
-//! recurrence adds at most one a step. If d(V) < 255, then it is also at least the length: some neighbour has d(V) − 1,
-//! one of its neighbours one less, and so on down to 0, which is occupied: that is a chain of d(V) steps. And d(V) = 255 says only that the length
-//! is 255 or more, which the first half has shown.
+//! *Claim.* If d is 0 just for the occupied voxels, and d(V) = min(255, 1 + min d(V + step)) for every free one, where
+//! beyond the grid d is 255, then d is that length. *Proof.* d(V) is at most the length: along the shortest chain from
+//! the occupied voxel back to V the recurrence adds at most one a step. If d(V) < 255, then it is also at least the
+//! length: some neighbour has d(V) − 1, one of its neighbours one less, and so on down to 0, which is occupied: that is
+//! a chain of d(V) steps. And d(V) = 255 says only that the length is 255 or more, which the first half has shown.
 //!
 //! So a local check in linear time proves the whole field, without knowledge of how it was built.
 
@@ -82,27 +83,28 @@ pub(crate) fn values(
     })
 }
 
-/// Checks all voxels, in parallel over slices; the error is that of the first wrong voxel in the order of linear coordinates.
+/// Checks all voxels, in parallel over slices; the error is that of the first wrong voxel in the order of linear
+/// coordinates.
 pub(crate) fn for_all(
     resolution: Resolution,
     check: impl Fn(Voxel) -> Result<(), FieldError> + Sync,
 ) -> Result<(), FieldError> {
     let slice = |k| {
-        let rows = (0..resolution.y).flat_map(|j| (0..resolution.x).map(move |i| Voxel::new(i, j, k)));
+        let rows = (0..resolution.y()).flat_map(|j| (0..resolution.x()).map(move |i| Voxel::new(i, j, k)));
         rows.map(&check).find_map(Result::err)
     };
-    (0..resolution.z).into_par_iter().find_map_first(slice).map_or(Ok(()), Err)
+    (0..resolution.z()).into_par_iter().find_map_first(slice).map_or(Ok(()), Err)
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::SafeZones;
+    use crate::{SafeZones, bytes::Bytes};
 
     /// Damages each stored byte of a field in turn, by one and by much, and requires that each time validation fails.
     pub(crate) fn assert_damage_is_found<F: SafeZones>(
         build: fn(&VoxelSet) -> F,
-        bytes: impl Fn(&mut F) -> &mut Vec<u8>,
+        bytes: impl Fn(&mut F) -> &mut Bytes,
     ) {
         let mut occupied = VoxelSet::new(Resolution::new(7, 5, 6));
         occupied.extend([Voxel::new(1, 1, 1), Voxel::new(5, 1, 2), Voxel::new(2, 4, 5), Voxel::new(2, 3, 5)]);

@@ -1,4 +1,5 @@
-//! The extended neighbourhood is the brute-force set of free cuboids, for points and boxes, and holds what any field proves.
+//! The extended neighbourhood is the brute-force set of free cuboids, for points and boxes, and holds what any field
+//! proves.
 
 mod common;
 
@@ -125,7 +126,8 @@ fn runs_at_the_borders_of_words() {
     }
 }
 
-/// The box of a light is itself occupied by the light: the caller passes the others only, and the box is looked at like any voxel.
+/// The box of a light is itself occupied by the light: the caller passes the others only, and the box is looked at like
+/// any voxel.
 #[test]
 fn an_area_light_sees_past_itself_but_not_past_others() {
     let resolution = Resolution::new(9, 9, 9);

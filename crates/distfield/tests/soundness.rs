@@ -48,8 +48,9 @@ fn hits(p: DVec3, q: DVec3, t: [DVec3; 3]) -> bool {
     if from != 0 || to != 0 {
         return through;
     }
-    // All in one plane, or the triangle has none. Then they touch iff they do in all projections: one of the projections
-    // keeps the plane. A triangle without a plane is a segment, which must be in a plane with the other one.
+    // All in one plane, or the triangle has none. Then they touch iff they do in all projections: one of the
+    // projections keeps the plane. A triangle without a plane is a segment, which must be in a plane with the other
+    // one.
     through
         && [[0, 1], [1, 2], [2, 0]].iter().all(|&[u, v]| {
             let flat = |p: DVec3| [p[u], p[v]];

@@ -1,16 +1,20 @@
-//! Building what a method needs: voxels, a distance field, a prover for each light.
+//! Building what a method needs: voxels, a distance field, a prover for each light; within a limit of memory.
+//!
+//! The voxels and the field must fit, or nothing is built. Then lights get their provers in the order of their list, as
+//! long as these fit; the lights that are left ask the field. All sizes are known before anything is allocated.
 
 use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use vdf_distfield::{ExtendedNeighbourhood, SafeNeighbourhood};
+use vdf_distfield::{ExtendedNeighbourhood, SafeNeighbourhood, VoxelBox};
 use vdf_geometry::{Bounds, Triangle};
-use vdf_voxel::{Voxel, VoxelGrid, VoxelSet, voxelize};
+use vdf_voxel::{Resolution, Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
-    AreaNeighbourhood, DistanceField, FieldProver, LightProver, Method, PointProver, Provers, VisibilityError,
-    prover::each_field,
+    AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightProver, Method, PointProver, Provers,
+    VisibilityError,
+    prover::{Occluders, Site, each_field},
 };
 
 /// What to build.
@@ -22,12 +26,15 @@ pub struct ProverOptions {
     pub voxel_size: f64,
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
+    /// The most memory in bytes that the voxels, the field and all neighbourhoods may take together. Building takes
+    /// some more for a while: for each thread that builds the neighbourhood of an area light three bits a voxel.
+    pub max_bytes: u64,
 }
 
 impl Default for ProverOptions {
-    /// `amr-xsn` with voxels of 1 unit, at most 2²⁹ (4 GiB).
+    /// `amr-xsn` with voxels of 1 unit, at most 2²⁹ of them and 4 GiB.
     fn default() -> Self {
-        Self { method: Method::default(), voxel_size: 1.0, max_voxels: 1 << 29 }
+        Self { method: Method::default(), voxel_size: 1.0, max_voxels: 1 << 29, max_bytes: 4 << 30 }
     }
 }
 
@@ -77,6 +84,8 @@ pub struct LightReport {
     pub voxels: Option<usize>,
     /// Its memory in bytes.
     pub bytes: usize,
+    /// Why queries to it ask the field although the method would keep a neighbourhood for it; `None` if that is not so.
+    pub fallback: Option<&'static str>,
 }
 
 impl BuildReport {
@@ -108,11 +117,12 @@ impl BuildReport {
 }
 
 impl Provers {
-    /// Builds what `options.method` needs for the occluders `triangles` and these lights, in a grid that covers `bounds`, which must
-    /// hold all occluders. Runs on the current rayon pool.
+    /// Builds what `options.method` needs for the occluders `triangles` and these lights, in a grid that covers
+    /// `bounds`, which must hold all occluders. Runs on the current rayon pool.
     ///
     /// # Errors
-    /// If the voxel size is not usable for these bounds, or the grid exceeds `options.max_voxels`.
+    /// If the voxel size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and
+    /// field `options.max_bytes`. A neighbourhood that exceeds `max_bytes` is no error: see [`LightReport::fallback`].
     pub fn build(
         options: &ProverOptions,
         triangles: &[Triangle],
@@ -121,25 +131,62 @@ impl Provers {
     ) -> Result<(Self, BuildReport), VisibilityError> {
         let mut report = BuildReport { lights: vec![LightReport::default(); lights.len()], ..BuildReport::default() };
         let Some(kind) = options.method.field() else { return Ok((Self::none(), report)) };
-        let grid = VoxelGrid::covering(bounds.min, bounds.max, options.voxel_size, options.max_voxels)?;
+        let (max_voxels, max_bytes) = (options.max_voxels, options.max_bytes);
+        let bytes = |resolution| shared_bytes(kind, resolution);
+        let grid =
+            VoxelGrid::covering_within(bounds.min, bounds.max, options.voxel_size, max_voxels, max_bytes, bytes)?;
+        let free = max_bytes.saturating_sub(bytes(grid.resolution()));
         let occupied = report.step(
             "voxels",
             || Ok(voxelize(&grid, triangles.par_iter().map(|t| t.vertices))?),
             VoxelSet::bytes,
         )?;
         let r = grid.resolution();
-        report.resolution = Some([r.x, r.y, r.z]);
+        report.resolution = Some(r.sides());
         report.voxel_size = options.voxel_size;
         (report.occupied, report.voxels) = (occupied.count(), r.voxel_count());
         let field = report.step("field", || Ok(DistanceField::build(kind, &occupied)), DistanceField::bytes)?;
 
-        let builder =
-            LightBuilder { point: options.method.point_prover(), grid, occupied: &occupied, field: &field, triangles };
-        let build = || lights.par_iter().map(|light| builder.prover(light)).collect::<Result<Vec<_>, _>>();
-        let provers = report.step("neighbourhoods", build, |all| all.iter().map(LightProver::bytes).sum())?;
-        report.lights = provers.iter().map(|p| LightReport { voxels: p.voxels(), bytes: p.bytes() }).collect();
+        let builder = LightBuilder { point: options.method.point_prover(), grid, occupied: &occupied, field: &field };
+        let provers = report.step(
+            "neighbourhoods",
+            || builder.provers(triangles, lights, free),
+            |all| all.iter().map(|(prover, _)| prover.bytes()).sum(),
+        )?;
+        let (provers, lights) = provers
+            .into_iter()
+            .map(|(prover, fallback)| {
+                let light = LightReport { voxels: prover.voxels(), bytes: prover.bytes(), fallback };
+                (prover, light)
+            })
+            .unzip();
+        report.lights = lights;
         Ok((Self::new(grid, Some(FieldProver::new(grid, field)), provers), report))
     }
+}
+
+/// The memory of the voxels and of a field over them, in bytes.
+fn shared_bytes(kind: FieldKind, resolution: Resolution) -> u64 {
+    let planes = match kind {
+        FieldKind::Ndf => 1,
+        FieldKind::Amr => 8,
+        FieldKind::Dsz => 6,
+        FieldKind::Dual => 7,
+    };
+    (resolution.voxel_count() as u64).saturating_mul(planes).saturating_add(VoxelSet::bytes_of(resolution))
+}
+
+/// What the hierarchy of an area light's near triangles takes at most, in bytes.
+const NEAR_BYTES: u64 = 32 << 10;
+
+/// What is to be built for a light.
+enum Plan {
+    /// The field answers, for a reason if a neighbourhood could be expected.
+    Field(Option<&'static str>),
+    /// A neighbourhood of a point light's voxel.
+    Point(Voxel),
+    /// A neighbourhood of an area light's box, with the triangles that are near.
+    Area(VoxelBox, Vec<Triangle>),
 }
 
 /// Chooses and builds the prover of each light.
@@ -148,22 +195,63 @@ struct LightBuilder<'a> {
     grid: VoxelGrid,
     occupied: &'a VoxelSet,
     field: &'a DistanceField,
-    triangles: &'a [Triangle],
 }
 
 impl LightBuilder<'_> {
-    fn prover(&self, light: &LightShape<'_>) -> Result<LightProver, VisibilityError> {
-        let keeps = self.point != PointProver::Field;
-        match light {
-            LightShape::Point(position) if keeps => {
-                Ok(self.grid.voxel_containing(*position).map_or(LightProver::Field, |voxel| self.point_prover(voxel)))
+    /// The prover of each light, and why it is only the field. In parallel over lights.
+    fn provers(
+        &self,
+        triangles: &[Triangle],
+        lights: &[LightShape<'_>],
+        free: u64,
+    ) -> Result<Vec<(LightProver, Option<&'static str>)>, VisibilityError> {
+        let any_area = self.point != PointProver::Field && lights.iter().any(|l| matches!(l, LightShape::Area(_)));
+        let occluders = Occluders::new(&self.grid, if any_area { triangles } else { &[] }, self.occupied)?;
+        let mut plans: Vec<_> = lights.par_iter().map(|light| self.plan(&occluders, light)).collect();
+        let mut free = free;
+        for plan in &mut plans {
+            match free.checked_sub(self.bytes(plan)) {
+                Some(rest) => free = rest,
+                None => *plan = Plan::Field(Some("its neighbourhood does not fit into the limit of memory")),
             }
-            LightShape::Area(light) if keeps => {
-                let area = AreaNeighbourhood::build(&self.grid, self.triangles, light)?;
-                Ok(area.map_or(LightProver::Field, LightProver::Area))
-            }
-            LightShape::Point(_) | LightShape::Area(_) | LightShape::Infinite => Ok(LightProver::Field),
         }
+        plans.into_par_iter().map(|plan| Ok(self.build(&occluders, plan)?)).collect()
+    }
+
+    fn plan(&self, occluders: &Occluders<'_>, light: &LightShape<'_>) -> Plan {
+        match light {
+            _ if self.point == PointProver::Field => Plan::Field(None),
+            LightShape::Infinite => Plan::Field(None),
+            LightShape::Point(position) => self
+                .grid
+                .voxel_containing(*position)
+                .map_or(Plan::Field(Some("it is outside the grid of voxels")), Plan::Point),
+            LightShape::Area(light) => match occluders.site(light) {
+                Site::Nowhere => Plan::Field(Some("it has no triangles")),
+                Site::Crowded => Plan::Field(Some("too many triangles are near it")),
+                Site::Found { light, near } => Plan::Area(light, near),
+            },
+        }
+    }
+
+    /// The memory of what is planned, in bytes, at most.
+    fn bytes(&self, plan: &Plan) -> u64 {
+        let resolution = self.grid.resolution();
+        let extended = ExtendedNeighbourhood::bytes_of(resolution);
+        match (plan, self.point) {
+            (Plan::Field(_), _) | (Plan::Point(_), PointProver::Field) => 0,
+            (Plan::Point(_), PointProver::Safe) => VoxelSet::bytes_of(resolution),
+            (Plan::Point(_), PointProver::Extended) => extended,
+            (Plan::Area(..), _) => extended.saturating_add(NEAR_BYTES),
+        }
+    }
+
+    fn build(&self, occluders: &Occluders<'_>, plan: Plan) -> Result<(LightProver, Option<&'static str>), VoxelError> {
+        Ok(match plan {
+            Plan::Field(fallback) => (LightProver::Field, fallback),
+            Plan::Point(voxel) => (self.point_prover(voxel), None),
+            Plan::Area(light, near) => (LightProver::Area(AreaNeighbourhood::build(occluders, light, &near)?), None),
+        })
     }
 
     fn point_prover(&self, light: Voxel) -> LightProver {
@@ -179,10 +267,93 @@ impl LightBuilder<'_> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     #[test]
     fn nothing_takes_no_time() {
         assert_eq!(format!("{:.1}", BuildReport::default().seconds()), "0.0");
+    }
+
+    /// A wall in a box of 10 units.
+    const WALL: [Triangle; 1] =
+        [Triangle::new(Vec3::new(5.0, 1.0, 1.0), Vec3::new(5.0, 9.0, 1.0), Vec3::new(5.0, 1.0, 9.0))];
+
+    fn build(options: ProverOptions, lights: &[LightShape<'_>]) -> Result<BuildReport, VisibilityError> {
+        let bounds = Bounds::new(DVec3::ZERO, DVec3::splat(10.0));
+        Provers::build(&options, &WALL, bounds, lights).map(|(_, report)| report)
+    }
+
+    fn options(method: &str, max_bytes: u64) -> ProverOptions {
+        ProverOptions {
+            method: method.parse().expect("a method"),
+            voxel_size: 0.1,
+            max_bytes,
+            ..ProverOptions::default()
+        }
+    }
+
+    #[test]
+    fn memory_is_as_estimated() {
+        let lights = [LightShape::Point(DVec3::splat(2.0)), LightShape::Area(&WALL)];
+        for method in Method::proving() {
+            let report = build(ProverOptions { method, ..options("none", 1 << 30) }, &lights).expect("fits");
+            let estimate = method.field().map(|kind| shared_bytes(kind, Resolution::new(100, 100, 100)));
+            assert_eq!(estimate, Some((report.parts[0].bytes + report.parts[1].bytes) as u64), "{method}");
+            let bytes = report.lights.iter().map(|l| l.bytes).collect::<Vec<_>>();
+            match method.point_prover() {
+                PointProver::Field => assert_eq!(bytes, [0, 0]),
+                PointProver::Safe => assert_eq!(bytes[0], 8 * 2 * 100 * 100),
+                PointProver::Extended => assert_eq!(bytes[0], 8 * 100 * 100),
+            }
+            assert!(bytes[1] < (8 * 100 * 100 + NEAR_BYTES) as usize);
+        }
+    }
+
+    #[test]
+    fn a_field_beyond_the_limit_is_an_error_that_names_what_fits() {
+        for method in ["ndf", "amr", "dsz-sn", "dual-xsn"] {
+            let limit = 700_000;
+            let error = build(options(method, limit), &[]).expect_err("a million voxels");
+            let VisibilityError::Voxel(VoxelError::TooMuchMemory { bytes, smallest, .. }) = error else {
+                panic!("{error}")
+            };
+            assert!(bytes > 1_000_000, "{bytes}");
+            let fits = build(ProverOptions { voxel_size: smallest, ..options(method, limit) }, &[]).expect("fits");
+            assert!(fits.bytes() <= limit as usize);
+            assert!(build(ProverOptions { voxel_size: smallest * 0.95, ..options(method, limit) }, &[]).is_err());
+        }
+    }
+
+    #[test]
+    fn lights_beyond_the_limit_ask_the_field() {
+        let lights: Vec<_> = (0..3_000).map(|n| LightShape::Point(DVec3::splat(0.003 * f64::from(n)))).collect();
+        for (method, each) in [("amr-sn", 160_000), ("ndf-xsn", 80_000)] {
+            let shared = build(options(method, 1 << 30), &[]).expect("fits").bytes() as u64;
+            let limit = shared + 10 * each + each / 2;
+            let report = build(options(method, limit), &lights).expect("fits");
+            assert!(report.bytes() as u64 <= limit);
+            let kept = report.lights.iter().filter(|l| l.voxels.is_some()).count();
+            assert_eq!(kept, 10);
+            for light in &report.lights {
+                assert_eq!(light.fallback.is_some(), light.voxels.is_none());
+                assert!(light.fallback.is_none_or(|reason| reason.contains("memory")), "{light:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_fallback_says_why() {
+        let many: Vec<_> = (0..65).map(|_| WALL[0]).collect();
+        let outside = LightShape::Point(DVec3::splat(11.0));
+        let report = build(options("amr-xsn", 1 << 30), &[outside, LightShape::Area(&[]), LightShape::Infinite]);
+        let reasons = report.expect("fits").lights.iter().map(|l| l.fallback).collect::<Vec<_>>();
+        assert_eq!(reasons, [Some("it is outside the grid of voxels"), Some("it has no triangles"), None]);
+        let bounds = Bounds::new(DVec3::ZERO, DVec3::splat(10.0));
+        let crowded = Provers::build(&options("amr-xsn", 1 << 30), &many, bounds, &[LightShape::Area(&many[..1])]);
+        assert_eq!(crowded.expect("fits").1.lights[0].fallback, Some("too many triangles are near it"));
+        let plain = build(options("amr", 1 << 30), &[outside, LightShape::Area(&WALL)]).expect("fits");
+        assert!(plain.lights.iter().all(|l| l.fallback.is_none()), "the method keeps nothing for any light");
     }
 }

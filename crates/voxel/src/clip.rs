@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::{Voxel, VoxelGrid};
+use crate::{Voxel, VoxelGrid, grid::GridPoint};
 
 /// The part of a segment that is inside a grid, as the voxels of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,9 +23,9 @@ impl VoxelGrid {
     ///
     /// # Guarantee
     /// Clipping is rounded outwards: ends are clipped to the grid enlarged by 128uG voxels and then move apart by as
-    /// much, with G the largest of 1, the resolution and the grid coordinates of the ends. So `Outside` is certain, and the
-    /// spanned cuboid holds the true part of the segment without the help of the dilation, however far away an end is.
-    /// `docs/numerics.md` has the derivation.
+    /// much, with G the largest of 1, the resolution and the grid coordinates of the ends. So `Outside` is certain, and
+    /// the spanned cuboid holds the true part of the segment without the help of the dilation, however far away an end
+    /// is. `docs/numerics.md` has the derivation.
     #[must_use]
     #[inline]
     pub fn voxel_span(&self, a: DVec3, b: DVec3) -> Span {
@@ -39,18 +39,17 @@ impl VoxelGrid {
     fn clipped_span(&self, a: DVec3, b: DVec3) -> Span {
         // One direction only, so that both directions round alike.
         if b.to_array() < a.to_array() {
-            return match self.span_in_order(b, a) {
+            return match self.span_of(self.grid_coordinates(b), self.grid_coordinates(a)) {
                 Span::Inside(b, a) => Span::Inside(a, b),
                 Span::Outside => Span::Outside,
             };
         }
-        self.span_in_order(a, b)
+        self.span_of(self.grid_coordinates(a), self.grid_coordinates(b))
     }
 
-    fn span_in_order(&self, a: DVec3, b: DVec3) -> Span {
+    fn span_of(&self, GridPoint(ga): GridPoint, GridPoint(gb): GridPoint) -> Span {
         let resolution = self.resolution();
-        let box_max = DVec3::new(resolution.x.into(), resolution.y.into(), resolution.z.into());
-        let (ga, gb) = (self.grid_coordinates(a), self.grid_coordinates(b));
+        let box_max = DVec3::new(resolution.x().into(), resolution.y().into(), resolution.z().into());
         let reach = ga.abs().max(gb.abs()).max(box_max).max_element();
         // `max` drops NaN, so both ends are asked as well.
         if !(ga.is_finite() && gb.is_finite() && reach < 1e200) {
@@ -84,7 +83,7 @@ impl VoxelGrid {
             to[axis] += outwards;
         }
         // Truncation clamps to the grid: conversion of negative numbers gives 0.
-        Span::Inside(self.truncated(from), self.truncated(to))
+        Span::Inside(self.truncated(GridPoint(from)), self.truncated(GridPoint(to)))
     }
 }
 

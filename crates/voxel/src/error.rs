@@ -44,6 +44,22 @@ pub enum VoxelError {
         /// A size that works.
         smallest: f64,
     },
+    /// What is to be stored for the grid's voxels would take more memory than allowed.
+    #[error(
+        "a voxel size of {size:?} takes {:.3} GiB of memory, more than the limit of {:.3} GiB: \
+         the smallest usable voxel size is {smallest:?}",
+        gib(*bytes), gib(*limit)
+    )]
+    TooMuchMemory {
+        /// The size asked for.
+        size: f64,
+        /// How many bytes it takes.
+        bytes: u64,
+        /// How many are allowed.
+        limit: u64,
+        /// A size that works.
+        smallest: f64,
+    },
     /// A triangle has a vertex that is NaN or infinite.
     #[error("a triangle has a vertex that is not finite")]
     NonFiniteTriangle,
@@ -71,4 +87,8 @@ pub enum VoxelError {
         /// The least such voxel.
         voxel: Voxel,
     },
+}
+
+fn gib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 30)
 }

@@ -1,16 +1,18 @@
 //! Voxel sets as files to look at and to compare: a surface, and a list of linear coordinates (5.3 in \[Houska2013\]).
 //!
-//! Both writers stream: beyond the set they hold at most one bit and a sixty-fourth of a number for each corner of the grid.
+//! Both writers stream: beyond the set they hold at most one bit and a sixty-fourth of a number for each corner of the
+//! grid.
 
 use std::io::{self, Write};
 
 use crate::{Resolution, Voxel, VoxelGrid, VoxelSet};
 
-/// Writes the surface of a set as Wavefront OBJ: the faces between a voxel of the set and one that is not, or the outside.
+/// Writes the surface of a set as Wavefront OBJ: the faces between a voxel of the set and one that is not, or the
+/// outside.
 ///
-/// Faces are squares in world units, counter-clockwise seen from outside the set. Vertices are shared by all faces at a corner, so
-/// the surface is closed: each edge has as many faces in one direction as in the other. Where voxels touch along an edge
-/// only, it has four.
+/// Faces are squares in world units, counter-clockwise seen from outside the set. Vertices are shared by all faces at a
+/// corner, so the surface is closed: each edge has as many faces in one direction as in the other. Where voxels touch
+/// along an edge only, it has four.
 ///
 /// Cost: O(voxels) and the text, about 30 bytes a vertex and 25 a face.
 ///
@@ -35,8 +37,8 @@ pub fn write_obj(grid: &VoxelGrid, set: &VoxelSet, out: &mut (impl Write + ?Size
     Ok(())
 }
 
-/// Writes the linear coordinates i + j·X + k·X·Y (Def. 6 in \[Houska2013\]) of a set's voxels, one a line in ascending order, after
-/// comments that say what the grid is.
+/// Writes the linear coordinates i + j·X + k·X·Y (Def. 6 in \[Houska2013\]) of a set's voxels, one a line in ascending
+/// order, after comments that say what the grid is.
 ///
 /// # Errors
 /// What `out` says.
@@ -51,7 +53,8 @@ fn describe(grid: &VoxelGrid, set: &VoxelSet, out: &mut (impl Write + ?Sized)) -
     let (r, o) = (grid.resolution(), grid.origin());
     debug_assert_eq!(r, set.resolution());
     writeln!(out, "# {} of {} voxels", set.count(), r.voxel_count())?;
-    writeln!(out, "# resolution {} {} {}", r.x, r.y, r.z)?;
+    let [x, y, z] = r.sides();
+    writeln!(out, "# resolution {x} {y} {z}")?;
     writeln!(out, "# origin {} {} {}", o.x, o.y, o.z)?;
     writeln!(out, "# voxel size {}", grid.voxel_size())
 }
@@ -91,7 +94,7 @@ struct Corners {
 
 impl Corners {
     fn of(set: &VoxelSet) -> Self {
-        let Resolution { x, y, z } = set.resolution();
+        let [x, y, z] = set.resolution().sides();
         let set = VoxelSet::from_rows(Resolution::new(x + 1, y + 1, z + 1), |j, k, row| {
             // The four rows of voxels around this row of corners; those beyond the grid have no words.
             let around =
@@ -104,8 +107,8 @@ impl Corners {
             for (w, corners) in row.iter_mut().enumerate() {
                 let any = around.iter().fold(0, |any, row| any | word(row, w));
                 let all = around.iter().fold(u64::MAX, |all, row| all & word(row, w));
-                // Corner i is between the voxels i − 1 and i. It is on the surface if some of its eight voxels are in the
-                // set and others are not: then two of them that share a face differ.
+                // Corner i is between the voxels i − 1 and i. It is on the surface if some of its eight voxels are in
+                // the set and others are not: then two of them that share a face differ.
                 let (any_before, all_before) = (any << 1 | any_last >> 63, all << 1 | all_last >> 63);
                 *corners = (any | any_before) & !(all & all_before);
                 (any_last, all_last) = (any, all);
@@ -123,7 +126,7 @@ impl Corners {
 
     fn number(&self, corner: Voxel) -> u64 {
         let row = self.set.row(corner.j, corner.k);
-        let row_number = corner.j as usize + self.set.resolution().y as usize * corner.k as usize;
+        let row_number = corner.j as usize + self.set.resolution().y() as usize * corner.k as usize;
         let (word, bit) = ((corner.i / 64) as usize, corner.i % 64);
         let in_words: u64 = row.iter().take(word).map(|w| u64::from(w.count_ones())).sum();
         let in_word = row.get(word).map_or(0, |w| (w & ((1 << bit) - 1)).count_ones());

@@ -40,15 +40,21 @@ impl fmt::Display for Voxel {
     }
 }
 
-/// The number of voxels of a grid along each axis; at least 1 each.
+/// A point in grid coordinates: in voxels, from the grid's origin. Points in world units are plain [`DVec3`]s, so that
+/// the two cannot be mixed up; only [`VoxelGrid::grid_coordinates`] leads from one to the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GridPoint(pub(crate) DVec3);
+
+/// The number of voxels of a grid along each axis; at least 1 each, by construction:
+///
+/// ```compile_fail
+/// let none = vdf_voxel::Resolution { x: 0, y: 1, z: 1 };
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Resolution {
-    /// Voxels along x.
-    pub x: u32,
-    /// Voxels along y.
-    pub y: u32,
-    /// Voxels along z.
-    pub z: u32,
+    x: u32,
+    y: u32,
+    z: u32,
 }
 
 impl Resolution {
@@ -61,10 +67,46 @@ impl Resolution {
         Self { x: positive(x), y: positive(y), z: positive(z) }
     }
 
-    /// The number of voxels.
+    /// Voxels along x, at least 1.
     #[must_use]
+    #[inline]
+    pub const fn x(self) -> u32 {
+        self.x
+    }
+
+    /// Voxels along y, at least 1.
+    #[must_use]
+    #[inline]
+    pub const fn y(self) -> u32 {
+        self.y
+    }
+
+    /// Voxels along z, at least 1.
+    #[must_use]
+    #[inline]
+    pub const fn z(self) -> u32 {
+        self.z
+    }
+
+    /// Voxels along x, y and z.
+    #[must_use]
+    #[inline]
+    pub const fn sides(self) -> [u32; 3] {
+        [self.x, self.y, self.z]
+    }
+
+    /// The number of voxels, at least 1; `usize::MAX` if there are more.
+    #[must_use]
+    #[inline]
     pub const fn voxel_count(self) -> usize {
-        self.x as usize * self.y as usize * self.z as usize
+        (self.x as usize).saturating_mul(self.row_count())
+    }
+
+    /// The number of rows along x, Y·Z, at least 1; `usize::MAX` if there are more.
+    #[must_use]
+    #[inline]
+    pub const fn row_count(self) -> usize {
+        (self.y as usize).saturating_mul(self.z as usize)
     }
 
     /// True if `voxel` is one of the grid's.
@@ -144,7 +186,6 @@ impl VoxelGrid {
             return Err(VoxelError::TooManyVoxels { size: voxel_size, voxels, budget, smallest: smallest() });
         }
 
-        let counts = counts(extent, voxel_size);
         let inverse_size = voxel_size.recip();
         // Adding zero turns −0.0 into 0.0.
         let origin = min + DVec3::ZERO;
@@ -152,10 +193,36 @@ impl VoxelGrid {
             origin,
             voxel_size,
             inverse_size,
-            resolution: Resolution::new(counts.x as u32, counts.y as u32, counts.z as u32),
-            upper: counts * (1.0 + 8.0 * f64::EPSILON),
+            resolution: resolution(extent, voxel_size),
+            upper: counts(extent, voxel_size) * (1.0 + 8.0 * f64::EPSILON),
             magnitude: (largest + origin.abs().max_element()) * inverse_size,
         })
+    }
+
+    /// [`Self::covering`] with a limit of memory: `bytes` says what will be stored for a grid of a resolution, and must
+    /// not grow when a side of the grid shrinks.
+    ///
+    /// # Errors
+    /// Those of [`Self::covering`], and [`VoxelError::TooMuchMemory`] if `bytes` gives more than `max_bytes`; that
+    /// names a size that works and is the smallest but for rounding to three digits.
+    pub fn covering_within(
+        min: DVec3,
+        max: DVec3,
+        voxel_size: f64,
+        max_voxels: u64,
+        max_bytes: u64,
+        bytes: impl Fn(Resolution) -> u64,
+    ) -> Result<Self, VoxelError> {
+        let grid = Self::covering(min, max, voxel_size, max_voxels)?;
+        let needed = bytes(grid.resolution);
+        // A grid of one voxel is always allowed, so that there is a size that works.
+        let limit = max_bytes.max(bytes(Resolution::new(1, 1, 1)));
+        if needed <= limit {
+            return Ok(grid);
+        }
+        let fits = |size: f64| bytes(resolution(max - min, size)) <= limit;
+        let smallest = smallest_that_fits(voxel_size, (max - min).max_element(), fits);
+        Err(VoxelError::TooMuchMemory { size: voxel_size, bytes: needed, limit: max_bytes, smallest })
     }
 
     /// The least corner of the grid.
@@ -192,11 +259,20 @@ impl VoxelGrid {
     #[must_use]
     #[inline]
     pub fn voxel_containing(&self, point: DVec3) -> Option<Voxel> {
-        let t = self.grid_coordinates(point);
+        let at = self.grid_coordinates(point);
+        let GridPoint(t) = at;
         // NaN fails every comparison; −0.0 passes as 0.0.
         let inside = (t.x >= 0.0) & (t.y >= 0.0) & (t.z >= 0.0);
         let inside = inside & (t.x <= self.upper.x) & (t.y <= self.upper.y) & (t.z <= self.upper.z);
-        inside.then(|| self.truncated(t))
+        inside.then(|| self.truncated(at))
+    }
+
+    /// The voxel nearest to `point`: the one that holds it, or one at the border if the point is outside the grid. A
+    /// coordinate that is not a number counts as the least. Clamping is done in grid coordinates, so it does not depend
+    /// on where in the world the grid lies.
+    #[must_use]
+    pub fn nearest_voxel(&self, point: DVec3) -> Voxel {
+        self.truncated(self.grid_coordinates(point))
     }
 
     /// The linear coordinate i + j·X + k·X·Y of a voxel (Def. 6 in \[Houska2013\]).
@@ -208,9 +284,9 @@ impl VoxelGrid {
 
     /// δ, in voxels: voxelization treats a voxel as if it were larger by δ on each side.
     ///
-    /// δ = 2⁻⁴⁷·(1 + M), which is 64·u·(1 + M) with the unit roundoff u = 2⁻⁵³ and M = (|x|max + |o|max) / s, the bound of
-    /// grid coordinates. It covers the rounding of end points (20u·(1 + M)), of vertices (4u·(1 + M)) and
-    /// of the voxelization itself (the rest). `docs/numerics.md` has the derivation.
+    /// δ = 2⁻⁴⁷·(1 + M), which is 64·u·(1 + M) with the unit roundoff u = 2⁻⁵³ and M = (|x|max + |o|max) / s, the bound
+    /// of grid coordinates. It covers the rounding of end points (20u·(1 + M)), of vertices (4u·(1 + M)) and of the
+    /// voxelization itself (the rest). `docs/numerics.md` has the derivation.
     ///
     /// Because a voxel spans at least four `f32` steps, M ≤ 2²³ and δ ≤ 2⁻²³ voxels: proofs lose next to nothing.
     #[must_use]
@@ -220,13 +296,13 @@ impl VoxelGrid {
 
     /// (p − o)/s with three roundings.
     #[inline]
-    pub(crate) fn grid_coordinates(&self, point: DVec3) -> DVec3 {
-        (point - self.origin) * self.inverse_size
+    pub(crate) fn grid_coordinates(&self, point: DVec3) -> GridPoint {
+        GridPoint((point - self.origin) * self.inverse_size)
     }
 
     /// The voxel of grid coordinates; what is outside goes to the nearest voxel.
     #[inline]
-    pub(crate) fn truncated(&self, t: DVec3) -> Voxel {
+    pub(crate) fn truncated(&self, GridPoint(t): GridPoint) -> Voxel {
         let last = self.resolution.last();
         Voxel::new((t.x as u32).min(last.i), (t.y as u32).min(last.j), (t.z as u32).min(last.k))
     }
@@ -246,6 +322,11 @@ fn counts(extent: DVec3, size: f64) -> DVec3 {
     (extent / size).ceil().max(DVec3::ONE)
 }
 
+fn resolution(extent: DVec3, size: f64) -> Resolution {
+    let counts = counts(extent, size);
+    Resolution::new(counts.x as u32, counts.y as u32, counts.z as u32)
+}
+
 fn count(extent: DVec3, size: f64) -> f64 {
     let counts = counts(extent, size);
     counts.x * counts.y * counts.z
@@ -261,11 +342,15 @@ fn finest_size(largest: f64) -> f64 {
 
 /// The smallest voxel size that is at least `finest` and within the budget, rounded up to three digits.
 fn smallest_usable(extent: DVec3, finest: f64, budget: u64) -> f64 {
-    let fits = |size: f64| count(extent, size) <= budget as f64;
+    smallest_that_fits(finest, extent.max_element(), |size| count(extent, size) <= budget as f64)
+}
+
+/// The smallest size that is at least `finest` and fits, rounded up to three digits. What fits must fit in larger
+/// voxels, too, and anything fits in voxels of the size `largest`.
+fn smallest_that_fits(finest: f64, largest: f64, fits: impl Fn(f64) -> bool) -> f64 {
     let mut size = finest;
     if !fits(size) {
-        // The count never grows with the size, and one voxel always fits.
-        let (mut low, mut high) = (finest, finest.max(extent.max_element()));
+        let (mut low, mut high) = (finest, finest.max(largest));
         for _ in 0..100 {
             let middle = (low * high).sqrt();
             if fits(middle) {

@@ -8,8 +8,8 @@
 //! > then the segment touches no triangle; not in the limit of good arithmetic, but for the very `f32` vertices and
 //! > `f64` end points that were passed.
 //!
-//! [`VoxelSet::validate`] checks a set against its triangles. The error budget behind the promise, [`VoxelGrid::dilation`],
-//! is derived in `docs/numerics.md`. Definitions are those of \[Houska2013\], chapter 3.
+//! [`VoxelSet::validate`] checks a set against its triangles. The error budget behind the promise,
+//! [`VoxelGrid::dilation`], is derived in `docs/numerics.md`. Definitions are those of \[Houska2013\], chapter 3.
 
 mod clip;
 mod error;
@@ -24,4 +24,4 @@ pub use error::VoxelError;
 pub use export::{write_indices, write_obj};
 pub use grid::{Resolution, Voxel, VoxelGrid};
 pub use set::VoxelSet;
-pub use voxelize::{Voxelizer, voxelize, voxelize_with};
+pub use voxelize::{Voxelizer, voxel_bounds, voxelize, voxelize_with};

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{Resolution, Voxel};
+use crate::{Resolution, Voxel, VoxelError};
 
 /// A set of voxels of one grid.
 ///
@@ -20,7 +20,7 @@ impl VoxelSet {
     #[must_use]
     pub fn new(resolution: Resolution) -> Self {
         let words_per_row = words_per_row(resolution);
-        let words = vec![0; words_per_row * resolution.y as usize * resolution.z as usize];
+        let words = vec![0; words_per_row.saturating_mul(resolution.row_count())];
         Self { resolution, words_per_row, words }
     }
 
@@ -31,8 +31,8 @@ impl VoxelSet {
         let mut set = Self::new(resolution);
         let per_row = set.words_per_row;
         let mask = padding_mask(resolution);
-        set.words.par_chunks_mut(per_row * resolution.y as usize).zip(0..resolution.z).for_each(|(slice, k)| {
-            for (row, j) in slice.chunks_exact_mut(per_row).zip(0..resolution.y) {
+        set.words.par_chunks_mut(per_row * resolution.y() as usize).zip(0..resolution.z()).for_each(|(slice, k)| {
+            for (row, j) in slice.chunks_exact_mut(per_row).zip(0..resolution.y()) {
                 fill(j, k, row);
                 if let Some(last) = row.last_mut() {
                     *last &= mask;
@@ -45,7 +45,7 @@ impl VoxelSet {
     /// A set from all its words, row after row; the caller has kept the padding clear.
     pub(crate) fn from_words(resolution: Resolution, words: Vec<u64>) -> Self {
         let words_per_row = words_per_row(resolution);
-        debug_assert_eq!(words.len(), words_per_row * resolution.y as usize * resolution.z as usize);
+        debug_assert_eq!(words.len(), words_per_row.saturating_mul(resolution.row_count()));
         Self { resolution, words_per_row, words }
     }
 
@@ -71,6 +71,36 @@ impl VoxelSet {
         }
     }
 
+    /// Adds all voxels of another set.
+    ///
+    /// # Errors
+    /// If it is of a grid of another resolution.
+    pub fn insert_all(&mut self, other: &Self) -> Result<(), VoxelError> {
+        self.each_word(other, |word, other| *word |= other)
+    }
+
+    /// Removes all voxels of another set.
+    ///
+    /// # Errors
+    /// If it is of a grid of another resolution.
+    pub fn remove_all(&mut self, other: &Self) -> Result<(), VoxelError> {
+        self.each_word(other, |word, other| *word &= !other)
+    }
+
+    fn each_word(&mut self, other: &Self, change: impl Fn(&mut u64, u64)) -> Result<(), VoxelError> {
+        if self.resolution != other.resolution {
+            return Err(VoxelError::ResolutionMismatch { set: other.resolution, grid: self.resolution });
+        }
+        self.words.iter_mut().zip(&other.words).for_each(|(word, &other)| change(word, other));
+        Ok(())
+    }
+
+    /// The memory of the bits of a set of such a grid, in bytes; `u64::MAX` if it is more.
+    #[must_use]
+    pub const fn bytes_of(resolution: Resolution) -> u64 {
+        8_u64.saturating_mul(resolution.x().div_ceil(64) as u64).saturating_mul(resolution.row_count() as u64)
+    }
+
     /// The number of voxels in the set.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -87,7 +117,11 @@ impl VoxelSet {
     #[must_use]
     #[inline]
     pub fn row(&self, j: u32, k: u32) -> &[u64] {
-        let start = (j as usize + self.resolution.y as usize * k as usize) * self.words_per_row;
+        // Without these checks a row beyond Y would be one of the next slice.
+        if j >= self.resolution.y() || k >= self.resolution.z() {
+            return &[];
+        }
+        let start = (j as usize + self.resolution.y() as usize * k as usize) * self.words_per_row;
         self.words.get(start..start + self.words_per_row).unwrap_or_default()
     }
 
@@ -99,7 +133,7 @@ impl VoxelSet {
 
     /// The voxels of the set in the order of their linear coordinates.
     pub fn iter(&self) -> impl Iterator<Item = Voxel> {
-        let rows = (0..self.resolution.z).flat_map(move |k| (0..self.resolution.y).map(move |j| (j, k)));
+        let rows = (0..self.resolution.z()).flat_map(move |k| (0..self.resolution.y()).map(move |j| (j, k)));
         rows.flat_map(move |(j, k)| {
             self.row(j, k).iter().zip(0u32..).flat_map(move |(&word, w)| {
                 let clear_lowest = |&rest: &u64| Some(rest & (rest - 1)).filter(|&rest| rest != 0);
@@ -125,19 +159,19 @@ impl Extend<Voxel> for VoxelSet {
 }
 
 pub(crate) fn words_per_row(resolution: Resolution) -> usize {
-    (resolution.x as usize).div_ceil(64)
+    (resolution.x() as usize).div_ceil(64)
 }
 
 /// Index of the word and number of the bit of a voxel.
 #[inline]
 pub(crate) fn bit_address(resolution: Resolution, words_per_row: usize, voxel: Voxel) -> (usize, u32) {
-    let row = voxel.j as usize + resolution.y as usize * voxel.k as usize;
+    let row = voxel.j as usize + resolution.y() as usize * voxel.k as usize;
     (row * words_per_row + (voxel.i / 64) as usize, voxel.i % 64)
 }
 
 /// The bits of a row's last word that stand for voxels.
 pub(crate) fn padding_mask(resolution: Resolution) -> u64 {
-    match resolution.x % 64 {
+    match resolution.x() % 64 {
         0 => u64::MAX,
         used => (1 << used) - 1,
     }

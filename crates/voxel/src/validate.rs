@@ -1,12 +1,13 @@
 //! Validation of a set of occupied voxels against the triangles that it was made from.
 //!
-//! *Idea.* Proofs of visibility are as good as the set that they rest on. So the set is checked against its definition by
-//! the slow twin of the voxelization, which shares no step with the fast one but the conversion to grid coordinates and
-//! the box of voxels around a triangle.
+//! *Idea.* Proofs of visibility are as good as the set that they rest on. So the set is checked against its definition
+//! by the slow twin of the voxelization, which shares no step with the fast one but the conversion to grid coordinates
+//! and the box of voxels around a triangle.
 //!
-//! *Guarantee.* If validation passes, every voxel whose closed cube touches a triangle, with the vertices converted to grid
-//! coordinates, is in the set. The twin runs at a dilation of δ/4, 16u·(1 + M), which covers its own rounding
-//! and no more: what it finds dilated by δ/2 touches, and that much every voxelization covers, so a sound set is never refused.
+//! *Guarantee.* If validation passes, every voxel whose closed cube touches a triangle, with the vertices converted to
+//! grid coordinates, is in the set. The twin runs at a dilation of δ/4, 16u·(1 + M), which covers its own rounding and
+//! no more: what it finds dilated by δ/2 touches, and that much every voxelization covers, so a sound set is never
+//! refused.
 //!
 //! *Cost.* That of [`Voxelizer::SeparatingAxes`](crate::Voxelizer), two to four times the voxelization.
 
@@ -24,10 +25,10 @@ impl VoxelSet {
     /// Checks that the set holds every voxel of `grid` that touches one of `triangles`; returns the number of *excess*
     /// voxels, which none of them touches: 0 but for triangles that miss a voxel by less than 2δ.
     ///
-    /// From cheap to dear: the resolution is the grid's; the bits that pad the rows are clear; the voxels of all vertices
-    /// inside the grid are in the set; so are all voxels that the exact test finds. The first failure is returned, with the
-    /// least number of a triangle and its least voxel, whatever the number of threads. Triangles are given in world
-    /// units, as to [`voxelize`](crate::voxelize()), and are iterated twice.
+    /// From cheap to dear: the resolution is the grid's; the bits that pad the rows are clear; the voxels of all
+    /// vertices inside the grid are in the set; so are all voxels that the exact test finds. The first failure is
+    /// returned, with the least number of a triangle and its least voxel, whatever the number of threads. Triangles are
+    /// given in world units, as to [`voxelize`](crate::voxelize()), and are iterated twice.
     ///
     /// # Errors
     /// [`VoxelError::ResolutionMismatch`], [`VoxelError::PaddingNotClear`] or [`VoxelError::NotOccupied`] if the set is
@@ -50,10 +51,10 @@ impl VoxelSet {
     fn validate_padding(&self) -> Result<(), VoxelError> {
         let resolution = self.resolution();
         let padding = !padding_mask(resolution);
-        for (j, k) in (0..resolution.z).flat_map(|k| (0..resolution.y).map(move |j| (j, k))) {
+        for (j, k) in (0..resolution.z()).flat_map(|k| (0..resolution.y()).map(move |j| (j, k))) {
             let extra = self.row(j, k).last().copied().unwrap_or_default() & padding;
             if extra != 0 {
-                let i = (resolution.x - 1) / 64 * 64 + extra.trailing_zeros();
+                let i = (resolution.x() - 1) / 64 * 64 + extra.trailing_zeros();
                 return Err(VoxelError::PaddingNotClear { voxel: Voxel::new(i, j, k) });
             }
         }

@@ -1,14 +1,14 @@
 //! Conservative voxelization: Σ′, the voxels that touch an occluder (3.3.1 in \[Houska2013\]).
 //!
 //! *Idea.* Each triangle is carried to grid coordinates in `f64`, and a method of [`Voxelizer`] finds its voxels. The
-//! default clips the triangle to slices of the grid and the slices to rows; its slow and obvious twin, for tests and for
-//! [`VoxelSet::validate`](crate::VoxelSet::validate), tests voxel by voxel.
+//! default clips the triangle to slices of the grid and the slices to rows; its slow and obvious twin, for tests and
+//! for [`VoxelSet::validate`](crate::VoxelSet::validate), tests voxel by voxel.
 //!
 //! *Guarantee.* A voxel is in the set if its closed cube, dilated by 24u·(1 + M), meets the closed triangle of the
 //! converted vertices; that is what the rounding of end points and vertices requires. Both methods aim at the dilation
 //! δ of [`VoxelGrid::dilation`] and lose less than δ − 24u·(1 + M) to their own rounding; no voxel is in the set that,
-//! dilated by 2δ, misses the triangle. Both bounds are derived in `docs/numerics.md`. Degenerate triangles are the segments
-//! or points that they are. A triangle in a common face of two voxels marks both.
+//! dilated by 2δ, misses the triangle. Both bounds are derived in `docs/numerics.md`. Degenerate triangles are the
+//! segments or points that they are. A triangle in a common face of two voxels marks both.
 //!
 //! *Cost.* Parallel over triangles, with an atomic OR for each word; since OR commutes, the result does not depend on
 //! threads.
@@ -23,17 +23,17 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub(crate) use self::atomic_bits::AtomicBits;
-use crate::{VoxelError, VoxelGrid, VoxelSet};
+use crate::{Voxel, VoxelError, VoxelGrid, VoxelSet, grid::GridPoint};
 
-/// How triangles become voxels. Both methods keep the guarantee of [`voxelize`]; sets differ at most in voxels that miss
-/// a triangle by less than 2δ.
+/// How triangles become voxels. Both methods keep the guarantee of [`voxelize`]; sets differ at most in voxels that
+/// miss a triangle by less than 2δ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Voxelizer {
     /// Clips a triangle to slices and rows of the grid, and fills runs of voxels. The fastest.
     #[default]
     Slices,
-    /// Tests voxels one by one by 13 axes: the slow twin, at a half to a quarter of the speed, with no step in common with the
-    /// other but the conversion to grid coordinates and the box of voxels around a triangle.
+    /// Tests voxels one by one by 13 axes: the slow twin, at a half to a quarter of the speed, with no step in common
+    /// with the other but the conversion to grid coordinates and the box of voxels around a triangle.
     SeparatingAxes,
 }
 
@@ -67,6 +67,16 @@ where
     }
 }
 
+/// The box of voxels around a triangle: the first and the last voxel of all that [`voxelize`] may add for it, `None` if
+/// there are none. Some of the box's voxels may not touch the triangle, but no voxel beyond the box is added for it.
+///
+/// # Errors
+/// If a vertex is not finite.
+pub fn voxel_bounds(grid: &VoxelGrid, triangle: [Vec3; 3]) -> Result<Option<[Voxel; 2]>, VoxelError> {
+    let triangle = GridTriangle::new(grid, triangle, 1.0)?;
+    Ok(triangle.map(|GridTriangle { bounds: [x, y, z], .. }| [0, 1].map(|end| Voxel::new(x[end], y[end], z[end]))))
+}
+
 fn scan_all<T>(
     grid: &VoxelGrid,
     triangles: T,
@@ -88,12 +98,13 @@ where
 /// A triangle in grid coordinates, and what of the grid it can touch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GridTriangle {
-    vertices: [DVec3; 3],
+    vertices: [GridPoint; 3],
     /// The first and the last voxel along each axis that the dilated bounds of the triangle touch.
     bounds: [[u32; 2]; 3],
     dilation: f64,
     /// Along two axes or all three the dilated bounds lie inside one voxel. Then the triangle touches all the voxels of
-    /// `bounds`, because it is connected. (Not: `bounds` has one voxel; at the grid's border the triangle may miss that.)
+    /// `bounds`, because it is connected. (Not: `bounds` has one voxel; at the grid's border the triangle may miss
+    /// that.)
     fills_bounds: bool,
 }
 
@@ -105,15 +116,15 @@ impl GridTriangle {
             return Err(VoxelError::NonFiniteTriangle);
         }
         let vertices = triangle.map(|v| grid.grid_coordinates(v.as_dvec3()));
-        let [a, b, c] = vertices;
+        let [GridPoint(a), GridPoint(b), GridPoint(c)] = vertices;
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
         let dilation = share * grid.dilation_reaching(min.abs().max(max.abs()).max_element());
         let (low, high) = (min - dilation, max + dilation);
         let resolution = grid.resolution();
         let (Some(x), Some(y), Some(z)) = (
-            touched(low.x, high.x, resolution.x),
-            touched(low.y, high.y, resolution.y),
-            touched(low.z, high.z, resolution.z),
+            touched(low.x, high.x, resolution.x()),
+            touched(low.y, high.y, resolution.y()),
+            touched(low.z, high.z, resolution.z()),
         ) else {
             return Ok(None);
         };

@@ -63,7 +63,7 @@ pub fn scene() -> impl Strategy<Value = (VoxelSet, Vec<Voxel>)> {
     (shapes(), count, indices(6)).prop_map(|(resolution, occupied, chosen)| {
         let at = |index: prop::sample::Index| {
             let n = index.index(resolution.voxel_count()) as u32;
-            Voxel::new(n % resolution.x, n / resolution.x % resolution.y, n / (resolution.x * resolution.y))
+            Voxel::new(n % resolution.x(), n / resolution.x() % resolution.y(), n / (resolution.x() * resolution.y()))
         };
         (set(resolution, occupied.into_iter().map(at)), chosen.into_iter().map(at).collect())
     })

@@ -7,6 +7,7 @@ mod provers;
 use vdf_distfield::{ExtendedNeighbourhood, Neighbourhood as _, SafeNeighbourhood};
 
 pub use area::AreaNeighbourhood;
+pub(crate) use area::{Occluders, Site};
 pub(crate) use field::each_field;
 pub use field::{DistanceField, FieldProver};
 pub use provers::Provers;

@@ -74,7 +74,7 @@ fn ends_are_rounded_outwards() {
     for face in 1..10u32 {
         let y = f64::from(5 * face);
         let (below, above) = (y.next_down(), y.next_up());
-        rounded_to_the_face += u32::from(grid.grid_coordinates(DVec3::splat(below)).y == f64::from(face));
+        rounded_to_the_face += u32::from(grid.grid_coordinates(DVec3::splat(below)).0.y == f64::from(face));
         // Along the face; through it, downwards and upwards, with the middle in the grid.
         for (ya, yb) in [(below, below), (above, below), (below, above)] {
             let Span::Inside(from, to) = grid.voxel_span(v(-1e4, ya, 7.0), v(1e4, yb, 7.0)) else {

@@ -119,7 +119,7 @@ fn grid(resolution: [u32; 3], size: f64) -> VoxelGrid {
     let origin = DVec3::new(-3.0, 0.5, 100.0);
     let extent = DVec3::from_array(resolution.map(|n| (f64::from(n) - 0.5) * size));
     let grid = VoxelGrid::covering(origin, origin + extent, size, 1 << 20).unwrap();
-    assert_eq!([grid.resolution().x, grid.resolution().y, grid.resolution().z], resolution);
+    assert_eq!(grid.resolution().sides(), resolution);
     grid
 }
 

@@ -42,6 +42,25 @@ fn negative_zero_as_origin() {
 }
 
 #[test]
+fn no_resolution_is_empty() {
+    let one = Resolution::new(0, 0, 0);
+    assert_eq!((one, one.voxel_count(), one.last()), (Resolution::new(1, 1, 1), 1, Voxel::new(0, 0, 0)));
+    let most = Resolution::new(u32::MAX, u32::MAX, u32::MAX);
+    assert_eq!((most.voxel_count(), most.sides()), (usize::MAX, [u32::MAX; 3]), "counts do not wrap around");
+}
+
+#[test]
+fn the_nearest_voxel_is_in_the_grid() {
+    for offset in [0.0, 1e6] {
+        let min = DVec3::splat(offset);
+        let grid = VoxelGrid::covering(min, min + DVec3::splat(9.0), 0.3, BUDGET).expect("a legal grid");
+        for (x, i) in [(-1e300, 0), (-0.1, 0), (0.4, 1), (8.9, 29), (9.1, 29), (1e300, 29), (f64::NAN, 0)] {
+            assert_eq!(grid.nearest_voxel(DVec3::splat(offset + x)), Voxel::new(i, i, i), "{x}");
+        }
+    }
+}
+
+#[test]
 fn flat_scenes_get_one_layer() {
     let grid = VoxelGrid::covering(DVec3::new(0.0, 3.0, 0.0), DVec3::new(4.0, 3.0, 0.0), 1.0, BUDGET);
     let grid = grid.expect("a legal grid");
@@ -75,6 +94,24 @@ fn voxels_below_single_precision_are_an_error_that_names_what_works() {
 }
 
 proptest! {
+    #[test]
+    fn the_size_named_for_too_much_memory_works(
+        extent in prop::array::uniform3(0f64..100.0), size in 0.1f64..3.0, limit in prop_oneof![0u64..1000, 0u64..10_000_000],
+    ) {
+        let extent = DVec3::from_array(extent);
+        let bytes = |r: Resolution| 8 * r.voxel_count() as u64 + 8 * r.row_count() as u64;
+        let covering = |size| VoxelGrid::covering_within(DVec3::ZERO, extent, size, BUDGET, limit, bytes);
+        match covering(size) {
+            Ok(grid) => prop_assert!(bytes(grid.resolution()) <= limit.max(16)),
+            Err(error @ VoxelError::TooMuchMemory { smallest, bytes, .. }) => {
+                prop_assert!(bytes > limit && smallest > size, "{error}");
+                prop_assert!(covering(smallest).is_ok(), "{error}");
+                prop_assert!(covering((smallest * 0.98).max(size)).is_err(), "{error}");
+            }
+            Err(other) => prop_assert!(false, "{other}"),
+        }
+    }
+
     #[test]
     fn the_named_size_works_and_is_nearly_the_smallest(
         min in prop::array::uniform3(-1e4f64..1e4), extent in prop::array::uniform3(0f64..1e4),

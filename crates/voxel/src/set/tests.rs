@@ -30,7 +30,10 @@ fn voxels_beyond_the_grid_are_never_in_the_set() {
         set.insert(v);
     }
     assert_eq!(set.count(), 65 * 4);
-    assert!(set.row(0, 2).is_empty());
+    // The row after the last one of a slice is none, not the first one of the next slice.
+    for (j, k) in [(0, 2), (2, 0), (3, 0), (u32::MAX, 0), (0, u32::MAX), (u32::MAX, u32::MAX)] {
+        assert!(set.row(j, k).is_empty(), "({j}, {k})");
+    }
 }
 
 #[test]
@@ -42,4 +45,24 @@ fn filling_rows_keeps_the_padding_clear() {
         let one = VoxelSet::from_rows(resolution, |j, k, row| row[0] = u64::from(j == 2 && k == 1));
         assert_eq!(one.iter().collect::<Vec<_>>(), [Voxel::new(0, 2, 1)]);
     }
+}
+
+#[test]
+fn sets_are_added_and_removed() {
+    let resolution = Resolution::new(67, 2, 2);
+    let every = |n: u32| {
+        let mut set = VoxelSet::new(resolution);
+        set.extend(resolution.voxels().filter(|v| (v.i + v.j + v.k) % n == 0));
+        set
+    };
+    let (two, three) = (every(2), every(3));
+    let (mut both, mut only) = (two.clone(), two.clone());
+    assert_eq!((both.insert_all(&three), only.remove_all(&three)), (Ok(()), Ok(())));
+    for v in resolution.voxels() {
+        assert_eq!(both.contains(v), two.contains(v) || three.contains(v));
+        assert_eq!(only.contains(v), two.contains(v) && !three.contains(v));
+    }
+    assert_eq!(VoxelSet::bytes_of(resolution), two.bytes() as u64);
+    let other = VoxelSet::new(Resolution::new(67, 4, 1));
+    assert!(both.insert_all(&other).is_err() && both.remove_all(&other).is_err());
 }

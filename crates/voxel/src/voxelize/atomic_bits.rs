@@ -16,7 +16,7 @@ pub(crate) struct AtomicBits {
 impl AtomicBits {
     pub(crate) fn new(resolution: Resolution) -> Self {
         let words_per_row = words_per_row(resolution);
-        let count = words_per_row * resolution.y as usize * resolution.z as usize;
+        let count = words_per_row.saturating_mul(resolution.row_count());
         Self { resolution, words_per_row, words: std::iter::repeat_with(AtomicU64::default).take(count).collect() }
     }
 

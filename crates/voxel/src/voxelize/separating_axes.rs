@@ -1,15 +1,18 @@
-//! Voxelization by the separating-axis test of a triangle and dilated unit cubes, prepared for many cubes of one triangle.
+//! Voxelization by the separating-axis test of a triangle and dilated unit cubes, prepared for many cubes of one
+//! triangle.
 //!
 //! A closed triangle and a closed box are disjoint iff one of 13 axes separates them: the 3 axes of the box, the normal
-//! of the triangle, and the 9 products of a box axis and an edge (Akenine-Möller). The products with one box axis live in
-//! the projection along it, so they are 2D edge tests (Schwarz and Seidel 2010).
+//! of the triangle, and the 9 products of a box axis and an edge (Akenine-Möller). The products with one box axis live
+//! in the projection along it, so they are 2D edge tests (Schwarz and Seidel 2010).
 //!
-//! Here every axis, the normal included, keeps the interval of *all three* projected vertices. For soundness an
-//! axis then may be anything: the exactly computed or a badly cancelled normal of a sliver, or the zero vector of a
-//! degenerate triangle, which separates nothing. Points and segments need no special case: the remaining axes are exactly
-//! those that they require.
+//! Here every axis, the normal included, keeps the interval of *all three* projected vertices. For soundness an axis
+//! then may be anything: the exactly computed or a badly cancelled normal of a sliver, or the zero vector of a
+//! degenerate triangle, which separates nothing. Points and segments need no special case: the remaining axes are
+//! exactly those that they require.
 
 use glam::DVec3;
+
+use crate::grid::GridPoint;
 
 /// Axes shorter than this (in the 1-norm) are not used: near the denormals relative error bounds fail.
 const SHORTEST_AXIS: f64 = 1e-180;
@@ -30,8 +33,8 @@ struct Projection {
 
 impl Projection {
     /// Prepares the projection to the coordinates `u` and `v`; `radius` is half of the dilated voxel.
-    fn new(vertices: &[DVec3; 3], u: usize, v: usize, radius: f64) -> Self {
-        let points = vertices.map(|p| [p[u], p[v]]);
+    fn new(vertices: &[GridPoint; 3], u: usize, v: usize, radius: f64) -> Self {
+        let points = vertices.map(|GridPoint(p)| [p[u], p[v]]);
         let axes = [0, 1, 2].map(|edge| {
             let [p, q] = [points[edge], points[(edge + 1) % 3]];
             let a = [p[1] - q[1], q[0] - p[0]];
@@ -70,13 +73,13 @@ struct Slab {
 
 impl Slab {
     /// Prepares the normal axis; `radius` is half of the dilated voxel.
-    fn new(vertices: &[DVec3; 3], radius: f64) -> Self {
-        let [a, b, c] = *vertices;
+    fn new(vertices: &[GridPoint; 3], radius: f64) -> Self {
+        let [GridPoint(a), GridPoint(b), GridPoint(c)] = *vertices;
         let n = (b - a).cross(c - a);
         let norm = n.abs().element_sum();
         let usable = norm >= SHORTEST_AXIS;
         let size = if usable { n.abs() } else { a.max(b).max(c) - a.min(b).min(c) };
-        let (low, high) = range(vertices.map(|p| n.dot(p)));
+        let (low, high) = range([a, b, c].map(|p| n.dot(p)));
         Self { n, low: low - radius * norm, high: high + radius * norm, axis: size.max_position(), usable }
     }
 
@@ -105,7 +108,7 @@ fn range(values: [f64; 3]) -> (f64, f64) {
 ///
 /// The bounds are the three axes of the box. A column that the projection of the triangle misses is skipped; the normal
 /// bounds the run of voxels in it, and only these are tested against the other two projections.
-pub(super) fn scan(vertices: &[DVec3; 3], bounds: &[[u32; 2]; 3], dilation: f64, mut visit: impl FnMut([u32; 3])) {
+pub(super) fn scan(vertices: &[GridPoint; 3], bounds: &[[u32; 2]; 3], dilation: f64, mut visit: impl FnMut([u32; 3])) {
     let radius = 0.5 + dilation;
     let slab = Slab::new(vertices, radius);
     let w = slab.axis;

@@ -4,26 +4,25 @@
 //! row of voxels leaves of that. The voxels of a row that touch a convex set are a run, from the voxel of its least to
 //! the voxel of its greatest coordinate. So two clips give all voxels of a row at once, exactly but for rounding.
 //!
-//! *Definition.* For each slice k the polygon P = {p ∈ triangle: k − δ ≤ z ≤ k + 1 + δ}, seen along z; for each row j the
-//! interval I = {x of p ∈ P: j − δ ≤ y ≤ j + 1 + δ}; the run is {i: \[i − δ, i + 1 + δ\] ∩ I ≠ ∅}.
+//! *Definition.* For each slice k the polygon P = {p ∈ triangle: k − δ ≤ z ≤ k + 1 + δ}, seen along z; for each row j
+//! the interval I = {x of p ∈ P: j − δ ≤ y ≤ j + 1 + δ}; the run is {i: \[i − δ, i + 1 + δ\] ∩ I ≠ ∅}.
 //!
-//! This is the scheme of 3.5.1 in \[Houska2013\]: rasterize a projection of the triangle conservatively, and fill for each
-//! covered pixel the run between the least and the greatest depth of the triangle. It departs in how it finds them. The
-//! thesis tests the centres of pixels against an offset polygon \[Hasselgren2005\] cut into trapezoids, and then still
-//! needs depths; the clip gives pixels and depths together, and depths of the *triangle*, not of its plane. And
-//! the projection is always along x, not along the dominant axis of the normal, because runs along x are bits of
+//! This is the scheme of 3.5.1 in \[Houska2013\]: rasterize a projection of the triangle conservatively, and fill for
+//! each covered pixel the run between the least and the greatest depth of the triangle. It departs in how it finds
+//! them. The thesis tests the centres of pixels against an offset polygon \[Hasselgren2005\] cut into trapezoids, and
+//! then still needs depths; the clip gives pixels and depths together, and depths of the *triangle*, not of its plane.
+//! And the projection is always along x, not along the dominant axis of the normal, because runs along x are bits of
 //! words. `docs/ARCHITECTURE.md` compares both.
 //!
-//! *Guarantee.* That of [`super`]. Clipping only interpolates along edges, with weights in \[0, 1\]: it is as accurate for
-//! slivers, needles, segments and points as for any triangle, and cannot overflow. No normal is ever computed.
+//! *Guarantee.* That of [`super`]. Clipping only interpolates along edges, with weights in \[0, 1\]: it is as accurate
+//! for slivers, needles, segments and points as for any triangle, and cannot overflow. No normal is ever computed.
 //!
 //! *Cost.* One clip for each slice, up to six crossings; one for each row, usually four; one OR for each 64 voxels
 //! of a run. So O(n²) for a triangle across n³ voxels, whatever its direction. A triangle inside one voxel, or inside
 //! a straight row of them, needs no clip.
 
-use glam::DVec3;
-
 use super::{AtomicBits, GridTriangle, touched};
+use crate::grid::GridPoint;
 
 /// Adds the voxels that touch a triangle.
 pub(super) fn scan(triangle: &GridTriangle, bits: &AtomicBits) {
@@ -68,15 +67,15 @@ struct Edge {
 }
 
 impl Slice {
-    fn of(vertices: &[DVec3; 3], low: f64, high: f64) -> Self {
+    fn of(vertices: &[GridPoint; 3], low: f64, high: f64) -> Self {
         // A plane takes one corner off a triangle and leaves two, so two planes leave at most five; six fit.
         let (mut points, mut len) = ([[0.0; 2]; 6], 0);
         let mut push = |point: [f64; 2]| {
             points[len] = point;
             len += 1;
         };
-        let mut a = vertices[2];
-        for &b in vertices {
+        let GridPoint(mut a) = vertices[2];
+        for &GridPoint(b) in vertices {
             // Always from the lower end, so that the order of the vertices does not matter.
             let (from, to) = if a.z <= b.z { (a, b) } else { (b, a) };
             if from.z <= high && to.z >= low {

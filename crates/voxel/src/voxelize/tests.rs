@@ -1,7 +1,6 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::Voxel;
 
 const VOXELIZERS: [Voxelizer; 2] = [Voxelizer::Slices, Voxelizer::SeparatingAxes];
 
@@ -105,6 +104,20 @@ proptest! {
     }
 
     #[test]
+    fn bounds_hold_all_voxels(triangle in triangle()) {
+        let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::from_array(SIDES.map(f64::from)), 1.0, 1 << 28).expect("a legal grid");
+        let world = triangle.map(|v| Vec3::from_array(v.map(|c| c as f32 / 16.0)));
+        let set = voxelize(&grid, vec![world]).expect("finite");
+        let bounds = voxel_bounds(&grid, world).expect("finite");
+        prop_assert!(bounds.is_some() || set.is_empty());
+        for v in set.iter() {
+            let [first, last] = bounds.expect("not empty");
+            prop_assert!(first.i <= v.i && first.j <= v.j && first.k <= v.k, "{first} {v}");
+            prop_assert!(v.i <= last.i && v.j <= last.j && v.k <= last.k, "{last} {v}");
+        }
+    }
+
+    #[test]
     fn vertex_order_does_not_matter(t in triangle()) {
         let set = voxelize_snapped(SIDES, 0.0, &[t]);
         for order in [[0, 2, 1], [1, 2, 0], [2, 1, 0]] {
@@ -138,7 +151,8 @@ proptest! {
         }
     }
 
-    /// Vertices far outside the grid round by more than the grid's own dilation. The middle of an edge is known exactly.
+    /// Vertices far outside the grid round by more than the grid's own dilation. The middle of an edge is known
+    /// exactly.
     #[test]
     fn points_of_triangles_that_reach_far(
         size in prop::sample::select(vec![3.0, 7.0, 0.7]),
