@@ -24,7 +24,9 @@ mod checksum;
 mod error;
 mod load;
 mod model;
+mod obj;
 mod source;
+mod text;
 
 pub use error::SceneError;
 pub use load::LoadOptions;

@@ -13,12 +13,8 @@ fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
 #[test]
 fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
     let scene = loaded("cbox_vol3", &[]);
-    let same: [fn(&mut Scene); 4] = [
-        |s| s.seed += 1,
-        |s| s.sample_count += 1,
-        |s| s.film.crop.x0 += 1,
-        |s| s.warnings.push("a warning".into()),
-    ];
+    let same: [fn(&mut Scene); 4] =
+        [|s| s.seed += 1, |s| s.sample_count += 1, |s| s.film.crop.x0 += 1, |s| s.warnings.push("a warning".into())];
     for change in same {
         let mut changed = scene.clone();
         change(&mut changed);

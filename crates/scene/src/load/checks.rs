@@ -7,8 +7,8 @@ use vdf_geometry::Triangle;
 
 use super::Loader;
 use super::document::Place;
-use crate::{Boundary, MediumId, PerspectiveSensor};
 use crate::SceneError;
+use crate::{Boundary, MediumId, PerspectiveSensor};
 
 /// At most this many points of a boundary are tested against another one.
 const MAX_PROBES: usize = 16;

@@ -3,23 +3,33 @@
 mod camera;
 mod checks;
 mod document;
+mod lines;
 mod names;
 mod objects;
 mod parameters;
 mod properties;
+mod reader;
+mod search;
 mod shapes;
 #[cfg(test)]
 mod tests;
 mod transform;
+mod xml;
 
 use std::cell::RefCell;
+use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::path::Path;
 
 use document::{Element, Ids, OBJECT_TAGS, Place};
 use parameters::Parameters;
+use search::Search;
 
+use crate::text::shown;
 use crate::{Boundary, Emitter, Medium, MediumId, Scene, SceneError, SceneSource, Surface};
+
+/// More warnings are not kept.
+const MAX_WARNINGS: usize = 100;
 
 /// What the user adds to a scene file.
 #[derive(Clone, Debug, Default)]
@@ -38,12 +48,15 @@ impl Scene {
     /// Loads a scene from disk or from memory.
     pub fn from_source(source: &SceneSource, options: &LoadOptions) -> Result<Self, SceneError> {
         let mut parameters = Parameters::new(&options.defines)?;
-        let root = document::read(source, &mut parameters)?;
+        let (root, search) = reader::read(source, &mut parameters)?;
         parameters.check_all_used()?;
         let loader = Loader {
             source,
+            search,
             ids: Ids::collect(&root)?,
             warnings: RefCell::default(),
+            mesh_bytes: 0,
+            triangles: 0,
             media: Vec::new(),
             medium_of_element: HashMap::new(),
             surfaces: Vec::new(),
@@ -59,8 +72,13 @@ impl Scene {
 #[derive(Debug)]
 struct Loader<'a> {
     source: &'a SceneSource,
+    search: Search,
     ids: Ids<'a>,
     warnings: RefCell<Vec<String>>,
+    /// Bytes of meshes that were read so far.
+    mesh_bytes: u64,
+    /// Triangles of mesh files so far.
+    triangles: usize,
     media: Vec<Medium>,
     medium_of_element: HashMap<usize, MediumId>,
     surfaces: Vec<Surface>,
@@ -72,7 +90,12 @@ struct Loader<'a> {
 
 impl<'a> Loader<'a> {
     fn warn(&self, at: &Place, message: &str) {
-        self.warnings.borrow_mut().push(format!("{at}: {message}"));
+        let mut warnings = self.warnings.borrow_mut();
+        match warnings.len().cmp(&MAX_WARNINGS) {
+            Ordering::Less => warnings.push(shown(&format!("{at}: {message}"))),
+            Ordering::Equal => warnings.push("more warnings are not shown".to_owned()),
+            Ordering::Greater => {}
+        }
     }
 
     fn scene(mut self, root: &'a Element) -> Result<Scene, SceneError> {

@@ -4,7 +4,7 @@ use super::Loader;
 use super::document::Element;
 use super::properties::Object;
 use crate::{Bsdf, Emitter, Medium, MediumId, Phase};
-use crate::{SceneError, Rgb};
+use crate::{Rgb, SceneError};
 
 const MOST: f64 = f32::MAX as f64;
 

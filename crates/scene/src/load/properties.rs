@@ -7,7 +7,7 @@ use glam::{DMat4, DVec3};
 use super::Loader;
 use super::document::{Element, Place};
 use super::{names, transform};
-use crate::{SceneError, Rgb};
+use crate::{Rgb, SceneError};
 
 /// A nested object, or one that a `ref` stands for.
 #[derive(Clone, Copy, Debug)]

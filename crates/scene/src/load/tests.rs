@@ -134,11 +134,11 @@ fn unknown_names_are_refused_with_the_nearest_one() {
     refused("<shape type='cube'><string name='flip_normals' value='a'/></shape>", "3:20", "cannot be a <string>");
     refused("<film type='hdrfilm'/>", "3:1", "inside <sensor>");
     refused("<float name='a' value='1'><float name='b' value='1'/></float>", "3:27", "inside <float>");
-    refused("<spectrum name='a' value='1'/>", "3:1", "not supported");
+    refused("<texture name='a' value='1'/>", "3:1", "not supported");
 }
 
 #[test]
-fn old_names_and_command_line_options_have_their_hints() {
+fn old_names_and_options_of_the_renderer_have_their_hints() {
     let medium = |name| format!("<medium type='homogeneous'><float name='{name}' value='1'/></medium>");
     for name in ["sigmaS", "sigma_s", "sigmaA", "sigma_a", "density"] {
         refused(&medium(name), "3:28", "albedo");
@@ -146,7 +146,7 @@ fn old_names_and_command_line_options_have_their_hints() {
     refused("<shape type='cube'><transform name='toWorld'/></shape>", "3:20", "\"to_world\"");
     refused("<integrator type='volpath'><string name='method' value='amr'/></integrator>", "3:1", "second integrator");
     let text = "<scene version='3.0.0'><integrator type='volpath'><string name='method' value='amr'/></integrator><sensor type='perspective'><film type='hdrfilm'/></sensor></scene>";
-    refused_text(text, &[], "s.xml:1:51", "--method");
+    refused_text(text, &[], "s.xml:1:51", "option of the renderer");
     refused_text("<scene version='0.6.0'/>", &[], "s.xml:1:1", "too old");
     refused_text("<scene/>", &[], "s.xml:1:1", "version");
 }
@@ -254,11 +254,9 @@ fn obj_files_are_read_or_refused_by_name() {
     assert!(good.warnings[0].contains("face_normals"));
     let bad = |faces: &str, part: &str| refused_text(&text, &[("m.obj", &format!("{v}{faces}"))], "s.xml:3:19", part);
     bad("", "m.obj: the mesh has no faces");
-    bad("f 1 2 9", "m.obj: ");
-    bad("f 1 2 0", "m.obj: ");
-    bad("f 1 x 3", "m.obj: ");
-    bad("v 1 nan 2\nf 1 2 5", "m.obj: ");
-    bad("f 1 -2 3", "m.obj:5: negative");
+    bad("f 1 2 9", "m.obj:5: there is no vertex 9 in \"f 1 2 9\"");
+    bad("f 1 2 0", "m.obj:5: ");
+    bad("v 1 nan 2\nf 1 2 5", "m.obj:5: ");
     refused_text(&text, &[], "s.xml:3:19", "cannot read \"m.obj\"");
 }
 
@@ -370,4 +368,113 @@ fn a_shape_too_far_from_the_origin_is_refused() {
     for fine in [at("1e7", 5.0), at("10000000.3", 500.0), at("70.1", 0.01), at("0", 1e-40)] {
         load(&fine);
     }
+}
+
+/// The work of each of these grew with the square of its size, or faster. Here each takes well under a second.
+#[test]
+fn large_files_take_linear_time() {
+    let begin = std::time::Instant::now();
+    let shape = "<shape type='rectangle'><transform name='to_world'><translate x='1'/></transform></shape>";
+    assert_eq!(load(&shape.repeat(20_000)).surfaces.len(), 20_000);
+    let parameters: String = (0..50_000).map(|i| format!("<default name='p{i}' value='{i}'/>")).collect();
+    let uses = "<emitter type='point'><float name='intensity' value='$p49999'/></emitter>";
+    assert_eq!(load(&(parameters + &uses.repeat(2000))).emitters.len(), 2001);
+    let children = "<string name='a' value='b'/>".repeat(50_000);
+    refused(&format!("<bsdf type='diffuse' id='b'>{children}</bsdf>"), "3:57", "given twice");
+    let nested = "<bsdf type='diffuse'/>".repeat(100);
+    let body = format!(
+        "<bsdf type='twosided' id='b'>{nested}</bsdf>{}",
+        "<shape type='cube'><ref id='b'/></shape>".repeat(5000)
+    );
+    refused(&body, "3:1", "100 nested BSDFs");
+    let long = "x".repeat(100_000);
+    let ids: String = (0..20).map(|i| format!("<bsdf type='diffuse' id='{long}{i}'/>")).collect();
+    let message =
+        load_with(&scene(&format!("{ids}<shape type='cube'><ref id='{long}'/></shape>")), &[], &[]).unwrap_err();
+    assert!(message.to_string().len() < 3000);
+    let namespaces: String = (0..5000).map(|i| format!("<scene xmlns:a{i}='b'>")).collect();
+    refused_text(&namespaces, &[], "s.xml:1:8", "namespaces are not supported");
+    let attributes: String = (0..50_000).map(|i| format!(" a{i}='b'")).collect();
+    refused(&format!("<bsdf{attributes}/>"), "3:125", "more than 16 attributes");
+    assert!(begin.elapsed().as_secs_f64() < 20.0, "{:?}", begin.elapsed());
+}
+
+#[test]
+fn the_bytes_of_all_included_files_are_bounded() {
+    let large = format!("<scene version='3.0.0'><!-- {} --></scene>", "x".repeat(8 << 20));
+    let text = scene(&"<include filename='a.xml'/>\n".repeat(9));
+    refused_text(&text, &[("a.xml", &large)], "s.xml:10:1", "bytes of the files before it");
+}
+
+#[test]
+fn columns_do_not_count_a_byte_order_mark() {
+    refused_text("\u{feff}<scene version='3.0.0'><oops/></scene>", &[], "s.xml:1:24", "<oops>");
+}
+
+#[test]
+fn comments_with_dashes_are_read() {
+    assert_eq!(load("<!-- a -- b ---><emitter type='constant'/><!------>").emitters.len(), 2);
+    refused("<!-- é -- -->\n<!-- -- --><oops/>", "4:12", "<oops>");
+}
+
+#[test]
+fn includes_and_meshes_are_found_in_their_folders() {
+    let leaf = format!("<scene version='3.0.0'>{LIGHT}</scene>");
+    let two = format!("<scene version='3.0.0'>{LIGHT}{LIGHT}</scene>");
+    let outer = "<scene version='3.0.0'><include filename='leaf.xml'/></scene>";
+    let count = |text: &str, others: &[(&str, &str)]| load_with(&scene(text), others, &[]).unwrap().emitters.len() - 1;
+    let nested = "<include filename='a/outer.xml'/>";
+    assert_eq!(count(nested, &[("a/outer.xml", outer), ("a/leaf.xml", &two), ("leaf.xml", &leaf)]), 2);
+    assert_eq!(count(nested, &[("a/outer.xml", outer), ("leaf.xml", &leaf)]), 1);
+    let path = "<path value='p'/><include filename='leaf.xml'/>";
+    assert_eq!(count(path, &[("p/leaf.xml", &leaf)]), 1);
+    assert_eq!(count(path, &[("p/leaf.xml", &leaf), ("leaf.xml", &two)]), 2);
+    let mesh = "<path value='p'/><shape type='obj'><string name='filename' value='m.obj'/></shape>";
+    let one = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let loaded = load_with(&scene(mesh), &[("p/m.obj", one), ("m.obj", &one.repeat(2))], &[]).unwrap();
+    assert_eq!(loaded.surfaces[0].triangles.len(), 1);
+    refused("<path value='q'/>", "3:1", "there is no folder \"q\"");
+    refused("<shape type='cube'><path value='q'/></shape>", "3:20", "directly inside <scene>");
+}
+
+#[test]
+fn files_of_other_kinds_are_named() {
+    let message = |path: &str, text: &'static str| {
+        let source = SceneSource::embedded(file(path, text), vec![]);
+        Scene::from_source(&source, &LoadOptions::default()).unwrap_err().to_string()
+    };
+    for (path, text, part) in [
+        ("a.OBJ", "v 0 0 0\n", "is a mesh"),
+        ("a.pbrt", "LookAt 0 0 0\n", "PBRT"),
+        ("a.blend", "BLENDER-v300", "Mitsuba add-on"),
+        ("a.json", "{}", "Mitsuba add-on"),
+        ("a.xml", "\0\u{1}", "binary"),
+        ("a.xml", "hello", "not XML"),
+        ("a.xml", "", "is empty"),
+    ] {
+        let message = message(path, text);
+        assert!(message.starts_with(path) && message.contains(part), "{message}");
+    }
+    assert!(message("a.obj", "<scene version='3.0.0'/>").contains("no sensor"));
+}
+
+/// A name in a file must not be able to forge a line of output or to steer the terminal.
+#[test]
+fn names_in_messages_are_escaped() {
+    for (body, part) in [
+        ("<shape type='cube'><ref id='a&#10;error: b&#9;\u{202e}c'/></shape>", "a\\nerror: b\\t\\u{202e}c"),
+        ("<bsdf type='\u{9b}2J'/>", "\\u{9b}2J"),
+        ("<include filename='a&#10;b'/>", "a\\nb"),
+    ] {
+        let message = load_with(&scene(body), &[], &[]).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+        assert!(message.lines().count() <= 2 && !message.contains(['\t', '\u{9b}', '\u{202e}']), "{message:?}");
+    }
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\na\u{1b}[31mb\n";
+    let text = scene("<shape type='obj'><string name='filename' value='m.obj'/></shape>");
+    let warnings = load_with(&text, &[("m.obj", mesh)], &[]).unwrap().warnings;
+    assert!(
+        warnings.iter().any(|w| w.contains("\\u{1b}[31mb")) && !warnings.concat().contains('\u{1b}'),
+        "{warnings:?}"
+    );
 }
