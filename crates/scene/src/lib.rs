@@ -31,8 +31,8 @@ mod text;
 pub use error::SceneError;
 pub use load::LoadOptions;
 pub use model::{
-    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
-    ReconstructionFilter, Scene, Surface,
+    Boundary, Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor,
+    Phase, PixelRect, ReconstructionFilter, Scene, Surface,
 };
 pub use source::{EmbeddedFile, SceneSource};
 

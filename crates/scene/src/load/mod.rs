@@ -3,6 +3,8 @@
 mod camera;
 mod checks;
 mod document;
+mod film;
+mod integrator;
 mod lines;
 mod names;
 mod objects;
@@ -13,12 +15,14 @@ mod search;
 mod shapes;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_mitsuba;
 mod transform;
 mod xml;
 
 use std::cell::RefCell;
 use std::cmp::Ordering;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use document::{Element, Ids, OBJECT_TAGS, Place};
@@ -37,6 +41,9 @@ pub struct LoadOptions {
     /// Values of the scene's `$name` parameters, stronger than its `<default>`s. One that the scene does not use is
     /// an error.
     pub defines: Vec<(String, String)>,
+    /// Which of the scene's sensors is the camera, counted from 0 in the order of the file. `None` is the first, with a warning if there are
+    /// several.
+    pub sensor: Option<usize>,
 }
 
 impl Scene {
@@ -63,8 +70,9 @@ impl Scene {
             boundaries: Vec::new(),
             boundary_places: Vec::new(),
             emitters: Vec::new(),
+            area_emitters: HashSet::new(),
         };
-        loader.scene(&root)
+        loader.scene(&root, options.sensor)
     }
 }
 
@@ -86,6 +94,8 @@ struct Loader<'a> {
     /// Where each boundary's shape is.
     boundary_places: Vec<&'a Place>,
     emitters: Vec<Emitter>,
+    /// The elements of the area emitters that a shape has.
+    area_emitters: HashSet<usize>,
 }
 
 impl<'a> Loader<'a> {
@@ -98,8 +108,8 @@ impl<'a> Loader<'a> {
         }
     }
 
-    fn scene(mut self, root: &'a Element) -> Result<Scene, SceneError> {
-        let (mut sensor, mut integrator, mut constant) = (None, None, None);
+    fn scene(mut self, root: &'a Element, chosen: Option<usize>) -> Result<Scene, SceneError> {
+        let (mut sensors, mut integrator, mut constant) = (Vec::new(), None, None);
         for element in &root.children {
             match element.tag.as_str() {
                 "shape" => shapes::read(&mut self, element)?,
@@ -108,13 +118,13 @@ impl<'a> Loader<'a> {
                 "bsdf" => drop(objects::bsdf(&self, element)?),
                 "phase" => drop(objects::phase(&self, element)?),
                 "emitter" => {
-                    let emitter = objects::emitter(&self, element)?;
+                    let Some(emitter) = objects::emitter(&self, element)? else { continue };
                     if matches!(emitter, Emitter::Constant { .. }) {
                         only_one(&mut constant, element, "constant emitter")?;
                     }
                     self.emitters.push(emitter);
                 }
-                "sensor" => only_one(&mut sensor, element, "sensor")?,
+                "sensor" => sensors.push(element),
                 "integrator" => only_one(&mut integrator, element, "integrator")?,
                 "alias" => {}
                 tag => {
@@ -129,10 +139,27 @@ impl<'a> Loader<'a> {
         }
         let missing =
             |what: &str, how: &str| Err(root.at.error(format!("the scene has no {what}"), format!("add {how}")));
-        let Some(sensor) = sensor else { return missing("sensor", "<sensor type=\"perspective\">") };
+        if sensors.is_empty() {
+            return missing("sensor", "<sensor type=\"perspective\">");
+        }
+        let Some(&sensor) = sensors.get(chosen.unwrap_or(0)) else {
+            let message = format!("the scene has no sensor {}", chosen.unwrap_or(0));
+            return Err(root.at.error(message, format!("it has {}, counted from 0", sensors.len())));
+        };
+        if chosen.is_none() && sensors.len() > 1 {
+            self.warn(&sensor.at, &format!("the scene has {} sensors: the first is used", sensors.len()));
+        }
         let Some(integrator) = integrator else { return missing("integrator", "<integrator type=\"volpath\"/>") };
-        let integrator = camera::integrator(&self, integrator)?;
         let camera = camera::read(&mut self, sensor)?;
+        let integrator = integrator::read(&self, integrator)?;
+        let unused = root.children.iter().find(|e| {
+            e.tag == "emitter"
+                && e.attribute("type").is_some_and(|kind| kind.value == "area")
+                && !self.area_emitters.contains(&e.serial)
+        });
+        if let Some(unused) = unused {
+            self.warn(&unused.at, "no shape refers to this area emitter: it does not shine");
+        }
         if self.emitters.is_empty() {
             self.warn(&root.at, "the scene has no emitter: the image will be black");
         }

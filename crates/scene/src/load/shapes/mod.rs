@@ -18,7 +18,7 @@ use crate::{Rgb, SceneError};
 /// Reads a shape into the scene.
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<(), SceneError> {
     let mut object = Object::new(loader, element, &["obj", "cube", "rectangle"])?;
-    let to_world = object.world_transform()?;
+    let to_world = object.world_transform(loader)?;
     let flip = object.boolean("flip_normals", false)?;
     let mut placed = Placement::new(to_world);
     match object.kind() {
@@ -90,10 +90,19 @@ fn attach<'a>(
             "a shape with an interior or exterior medium but without a null BSDF is opaque",
             "add <bsdf type=\"null\"/> to let light through; without a BSDF Mitsuba 3 makes it diffuse 0.5",
         )),
-        None if radiance.is_some() => Err(at.error(
-            "an area emitter on a shape with a null BSDF",
+        None if radiance.is_some() && has_medium => Err(at.error(
+            "an area emitter on the boundary of a medium",
             "give the light its own shape, with a diffuse BSDF or none",
         )),
+        // The Blender add-on writes every area light so. In Mitsuba one can look through such a light; here it is black behind its
+        // emission. The pictures are the same unless something is behind the light, or is seen or lit through its back.
+        None if radiance.is_some() => {
+            loader.warn(
+                at,
+                "an area emitter with a null BSDF: Mitsuba lets light through it, here it is opaque and black",
+            );
+            attach(loader, element, triangles, Some(objects::default_bsdf(true)), radiance, [None, None])
+        }
         None if has_medium => {
             loader.boundaries.push(Boundary { triangles, interior, exterior });
             loader.boundary_places.push(at);
@@ -141,11 +150,11 @@ fn media<'a>(
     Ok((interior, exterior))
 }
 
-fn area_emitter<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Option<Rgb>, SceneError> {
+fn area_emitter<'a>(loader: &mut Loader<'a>, object: &mut Object<'a>) -> Result<Option<Rgb>, SceneError> {
     let Some(nested) = object.at_most_one("emitter")? else { return Ok(None) };
-    let mut emitter = Object::new(loader, nested.object, &["area"])?;
-    let radiance = emitter.colour("radiance", 1.0, f64::from(f32::MAX))?;
-    objects::sampling_weight(&mut emitter)?;
-    emitter.finish()?;
+    let radiance = objects::area_emitter(loader, nested.object)?;
+    if !loader.area_emitters.insert(nested.object.serial) {
+        loader.warn(nested.at, "several shapes share this emitter: Mitsuba refuses that; here each of them shines");
+    }
     Ok(Some(radiance))
 }
