@@ -68,7 +68,7 @@ impl Scene {
             medium_of_element: HashMap::new(),
             surfaces: Vec::new(),
             boundaries: Vec::new(),
-            boundary_places: Vec::new(),
+            boundary_elements: Vec::new(),
             emitters: Vec::new(),
             area_emitters: HashSet::new(),
         };
@@ -91,8 +91,8 @@ struct Loader<'a> {
     medium_of_element: HashMap<usize, MediumId>,
     surfaces: Vec<Surface>,
     boundaries: Vec<Boundary>,
-    /// Where each boundary's shape is.
-    boundary_places: Vec<&'a Place>,
+    /// The shape of each boundary.
+    boundary_elements: Vec<&'a Element>,
     emitters: Vec<Emitter>,
     /// The elements of the area emitters that a shape has.
     area_emitters: HashSet<usize>,
@@ -163,7 +163,13 @@ impl<'a> Loader<'a> {
         if self.emitters.is_empty() {
             self.warn(&root.at, "the scene has no emitter: the image will be black");
         }
-        checks::media_are_consistent(&self, &camera.sensor, &sensor.at, constant.map(|e: &Element| &e.at))?;
+        checks::media_are_consistent(
+            &self,
+            &camera.sensor,
+            &camera.film,
+            &sensor.at,
+            constant.map(|e: &Element| &e.at),
+        )?;
         Ok(Scene {
             surfaces: self.surfaces,
             boundaries: self.boundaries,

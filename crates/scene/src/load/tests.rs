@@ -326,18 +326,24 @@ fn the_cameras_medium_is_checked() {
     let turned = format!("{FOG}{}", fog_cube(1.0, "<boolean name='flip_normals' value='true'/>"));
     assert!(load_with(&with_sensor(&turned.replace("interior", "exterior"), "<ref id='fog'/>"), &[], &[]).is_ok());
     refused(&turned.replace("interior", "exterior"), "4:1", "camera is inside the medium");
-    let other = with_sensor(&inside, "<medium type='homogeneous'/>");
+    let thick = "<medium type='homogeneous'><float name='sigma_t' value='2'/></medium>";
+    let other = with_sensor(&inside, thick);
     refused_text(&other, &[], "s.xml:4:1", "not the one that is around");
 }
 
 #[test]
 fn fog_must_not_vanish_behind_an_inner_boundary() {
+    let thick = "<medium type='homogeneous' id='thick'><float name='sigma_t' value='2'/></medium>";
+    let cube = |more: &str| {
+        let moved = fog_cube(1.0, more).replace("</transform>", "<translate z='5'/></transform>");
+        moved.replace("id='fog' name='interior'", "id='thick' name='interior'")
+    };
     let nested =
-        |more: &str| with_sensor(&format!("{FOG}{}\n{}", fog_cube(9.0, ""), fog_cube(1.0, more)), "<ref id='fog'/>");
+        |more: &str| with_sensor(&format!("{FOG}{thick}{}\n{}", fog_cube(9.0, ""), cube(more)), "<ref id='fog'/>");
     refused_text(&nested(""), &[], "s.xml:4:1", "would vanish");
     assert!(load_with(&nested("<ref id='fog' name='exterior'/>"), &[], &[]).is_ok());
     let away = "<transform name='to_world'><translate z='-5'/></transform><ref id='fog'/>";
-    refused_text(&with_sensor(&format!("{FOG}\n{}", fog_cube(1.0, "")), away), &[], "s.xml:4:1", "would vanish");
+    refused_text(&with_sensor(&format!("{FOG}{thick}\n{}", cube("")), away), &[], "s.xml:4:1", "would vanish");
 }
 
 #[test]
@@ -371,7 +377,7 @@ fn a_shape_too_far_from_the_origin_is_refused() {
     }
 }
 
-/// The work of each of these grew with the square of its size, or faster. Here each takes well under a second.
+/// The work of each of these grew with the square of its size, or faster. Here they take some seconds on a busy machine.
 #[test]
 fn large_files_take_linear_time() {
     let begin = std::time::Instant::now();
@@ -397,7 +403,7 @@ fn large_files_take_linear_time() {
     refused_text(&namespaces, &[], "s.xml:1:8", "namespaces are not supported");
     let attributes: String = (0..50_000).map(|i| format!(" a{i}='b'")).collect();
     refused(&format!("<bsdf{attributes}/>"), "3:125", "more than 16 attributes");
-    assert!(begin.elapsed().as_secs_f64() < 20.0, "{:?}", begin.elapsed());
+    assert!(begin.elapsed().as_secs_f64() < 60.0, "{:?}", begin.elapsed());
 }
 
 #[test]

@@ -169,7 +169,8 @@ fn camera_matrices_with_few_digits_become_rotations() {
         assert!(digits(9, turn).unwrap().warnings.is_empty());
     }
     let mirrored = camera("-0.9995 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1").unwrap();
-    assert_eq!(DMat3::from_mat4(mirrored.sensor.world_from_camera), DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)));
+    let mirroring = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    assert!(DMat3::from_mat4(mirrored.sensor.world_from_camera).abs_diff_eq(mirroring, 1e-14));
     for scaled in ["1.002 0 0 0 1.002 0 0 0 1.002", "1 0 0.01 0 1 0 0 0 1", "2 0 0 0 2 0 0 0 2", "1 0 0 0 1 0 0 0 0.99"]
     {
         assert!(camera(scaled).unwrap_err().to_string().contains("scales"), "{scaled}");
@@ -209,7 +210,7 @@ fn properties_of_the_sensor_without_effect_are_warned_about() {
 #[test]
 fn area_lights_may_be_referred_to() {
     let light = "<emitter type='area' id='l'><rgb name='radiance' value='2'/></emitter>";
-    let shape = "<shape type='rectangle'><ref id='l'/></shape>";
+    let shape = "<shape type='cube'><ref id='l'/></shape>";
     let loaded = load(&format!("{light}{shape}"));
     assert_eq!(loaded.surfaces[0].radiance, Some(Vec3::splat(2.0)));
     assert_eq!(loaded.emitters[0], Emitter::Area { surface: 0 });

@@ -105,7 +105,7 @@ fn attach<'a>(
         }
         None if has_medium => {
             loader.boundaries.push(Boundary { triangles, interior, exterior });
-            loader.boundary_places.push(at);
+            loader.boundary_elements.push(element);
             Ok(())
         }
         None => {
