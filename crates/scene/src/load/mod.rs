@@ -47,12 +47,23 @@ pub struct LoadOptions {
 }
 
 impl Scene {
-    /// Loads a scene file.
+    /// Loads a scene file from disk. Its includes are looked up beside the including file, beside the scene file, and in the folders of its
+    /// `<path>` elements; its meshes in those folders, and beside the scene file.
+    ///
+    /// # Errors
+    /// [`SceneError`] if a file cannot be read, or says what is wrong or not supported. So that a file from anywhere can be tried, only plain files
+    /// are opened (no pipes, no devices), and there are limits: 64 MiB and a million elements of XML with all includes, 8 GiB of meshes, 2²⁸
+    /// triangles, 32 levels of elements, 15 of includes, 16 attributes an element. Polygons that are not convex may take 2²⁸ steps in each mesh,
+    /// about two seconds; more have to be cut into triangles beforehand.
+    ///
+    /// # Cost
+    /// Linear in the size of the files, about 100 ns a byte of XML and 20 ns a byte of a mesh. Meshes are read in a stream; in memory a triangle
+    /// takes 36 bytes, and 80 more while its mesh is read.
     pub fn load(path: &Path, options: &LoadOptions) -> Result<Self, SceneError> {
         Self::from_source(&SceneSource::disk(path), options)
     }
 
-    /// Loads a scene from disk or from memory.
+    /// Loads a scene from disk or from memory, with the errors and the cost of [`Scene::load`].
     pub fn from_source(source: &SceneSource, options: &LoadOptions) -> Result<Self, SceneError> {
         let mut parameters = Parameters::new(&options.defines)?;
         let (root, search) = reader::read(source, &mut parameters)?;

@@ -5,7 +5,7 @@ use vdf_geometry::{Bounds, Segment, Triangle, intersect_exact};
 
 use super::super::Loader;
 use super::super::document::Place;
-use crate::{Boundary, FilmSettings, PerspectiveSensor};
+use crate::{FilmSettings, PerspectiveSensor};
 
 /// Rays along each side of the picture that are followed from the camera to the near plane.
 const RAYS: u32 = 5;
@@ -29,7 +29,7 @@ pub(super) fn warn(loader: &Loader<'_>, sensor: &PerspectiveSensor, film: &FilmS
         let near = |t: &&Triangle| Bounds::of_triangles([*t]).touches(&reach);
         boundary.triangles.iter().filter(near).any(|t| rays.iter().any(|ray| intersect_exact(ray, t).is_some()))
     });
-    if let Some((Boundary { .. }, element)) = jumped {
+    if let Some((_, element)) = jumped {
         loader.warn(
             at,
             &format!(

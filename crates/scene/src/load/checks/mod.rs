@@ -16,8 +16,8 @@ use crate::{FilmSettings, MediumId, PerspectiveSensor, SceneError};
 use closed::{Closed, Work};
 use tree::Tree;
 
-/// Boundaries are compared with each other until this many triangles were looked at, about a second. It is enough for 100,000 separate boxes.
-const MOST_WORK: u64 = 20_000_000;
+/// Boundaries are compared with each other until this many triangles were looked at, less than a second. It is enough for 100,000 separate boxes.
+const MOST_WORK: u64 = 10_000_000;
 
 /// The medium that the sensor and each boundary claim to be in must be the one around them; what the clip planes hide is warned about.
 pub(super) fn media_are_consistent(
