@@ -11,11 +11,11 @@ fn file(path: &str, text: &str) -> EmbeddedFile {
 }
 
 fn builtin_text() -> String {
-    builtin("cbox_vol2").unwrap().files()[0].text.to_string()
+    builtin("cbox_vol2").expect("it is built in").files()[0].text.to_string()
 }
 
 fn try_builtin(text: &str, mesh: Option<&str>) {
-    let source = builtin("cbox_vol2").unwrap();
+    let source = builtin("cbox_vol2").expect("it is built in");
     let mut others = source.files()[1..].to_vec();
     if let Some(mesh) = mesh {
         others[0].text = Cow::Owned(mesh.to_owned());
@@ -56,7 +56,7 @@ proptest! {
 
     #[test]
     fn mutated_meshes_never_panic(cuts in cuts("[vflpnt/0-9 .,e#\\\\\r\n-]{0,12}")) {
-        let mesh = builtin("cbox_vol2").unwrap().files()[1].text.to_string();
+        let mesh = builtin("cbox_vol2").expect("it is built in").files()[1].text.to_string();
         try_builtin(&builtin_text(), Some(&mutate(&mesh, &cuts)));
     }
 }

@@ -485,3 +485,21 @@ fn names_in_messages_are_escaped() {
         "{warnings:?}"
     );
 }
+
+/// The coordinates of maps have seven digits before the point: they are moved to the origin before they are rounded.
+#[test]
+fn a_mesh_far_away_is_moved_before_it_is_rounded() {
+    let mesh = "v -2487000.1 4684683.1 0\nv -2487000 4684683.1 0\nv -2487000 4684683.2 0\nf 1 2 3\n";
+    let text = |more: &str| {
+        scene(&format!(
+            "<shape type='obj'><string name='filename' value='m.obj'/><boolean name='face_normals' value='true'/>{more}</shape>"
+        ))
+    };
+    let near = "<transform name='to_world'><translate x='2487000' y='-4684683'/></transform>";
+    let loaded = load_with(&text(near), &[("m.obj", mesh)], &[]).unwrap();
+    let expected = [Vec3::new(-0.1, 0.1, 0.0), Vec3::new(0.0, 0.1, 0.0), Vec3::new(0.0, 0.2, 0.0)];
+    for (vertex, expected) in loaded.surfaces[0].triangles[0].vertices.iter().zip(expected) {
+        assert!((*vertex - expected).abs().max_element() < 1e-8, "{vertex} {expected}");
+    }
+    refused_text(&text(""), &[("m.obj", mesh)], "s.xml:3:1", "precision exhausted");
+}

@@ -102,7 +102,7 @@ impl Triangulator {
         // Each coordinate rises once and falls once; a star with five points does so twice.
         let changes = |coordinate: fn(DVec2) -> f64| {
             let rises = || (0..n).map(|i| coordinate(point(i + 1) - point(i))).filter(|d| *d != 0.0).map(|d| d > 0.0);
-            let Some(mut last) = rises().last() else { return 0 };
+            let Some(mut last) = rises().next_back() else { return 0 };
             rises().filter(|&rise| std::mem::replace(&mut last, rise) != rise).count()
         };
         turns_left && changes(|p| p.x) <= 2 && changes(|p| p.y) <= 2
@@ -162,6 +162,7 @@ impl Triangulator {
         if turned < 0.0 || turned.is_nan() {
             return Some(false);
         }
+        let (low, high) = (ear[0].min(ear[1]).min(ear[2]), ear[0].max(ear[1]).max(ear[2]));
         let mut i = 0;
         while let Some(&other) = self.reflex.get(i) {
             if !self.is_reflex[other] {
@@ -170,7 +171,9 @@ impl Triangulator {
             }
             work.step()?;
             i += 1;
-            if other != before && other != tip && other != after && self.blocks(other, ear) {
+            let p = self.points[other];
+            let is_near = p.cmpge(low).all() && p.cmple(high).all();
+            if is_near && other != before && other != tip && other != after && self.blocks(other, ear) {
                 return Some(false);
             }
         }
