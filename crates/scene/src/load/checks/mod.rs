@@ -7,11 +7,13 @@ mod seams;
 mod tests;
 mod tree;
 
-use vdf_geometry::Bounds;
+use std::collections::HashMap;
+
+use vdf_geometry::{Bounds, Triangle};
 
 use super::Loader;
 use super::document::{Element, Place};
-use crate::{FilmSettings, MediumId, PerspectiveSensor, SceneError};
+use crate::{FilmSettings, Medium, MediumId, PerspectiveSensor, Phase, SceneError};
 
 use closed::{Closed, Work};
 use tree::Tree;
@@ -47,28 +49,67 @@ pub(super) fn media_are_consistent(
     Ok(())
 }
 
+/// The boundaries that are closed by themselves. The others must close together: a wall between two media may be a shape of its own, with a
+/// medium on each side, and the rest of each medium's surface another.
 fn closed_boundaries<'a>(loader: &'a Loader<'_>) -> Result<Vec<Closed<'a>>, SceneError> {
     let mut closed = Vec::new();
+    let mut open: Vec<Open<'a>> = Vec::new();
+    let mut open_of_medium = HashMap::new();
     for (boundary, element) in loader.boundaries.iter().zip(&loader.boundary_elements) {
         // A surface between equal media is none.
         if same(loader, boundary.interior, boundary.exterior) {
             continue;
         }
-        let Some(hole) = seams::hole(&boundary.triangles) else {
+        if seams::hole(&boundary.triangles).is_none() {
             closed.push(Closed::new(boundary, element));
             continue;
-        };
+        }
+        for (side, is_outer) in [(boundary.interior, false), (boundary.exterior, true)] {
+            let Some(medium) = medium(loader, side) else { continue };
+            let number = *open_of_medium.entry(key(medium)).or_insert(open.len());
+            if number == open.len() {
+                open.push(Open::default());
+            }
+            if let Some(open) = open.get_mut(number) {
+                open.add(&boundary.triangles, is_outer, element);
+            }
+        }
+    }
+    open.iter().try_for_each(Open::check)?;
+    Ok(closed)
+}
+
+/// The surfaces of one medium that are open by themselves, with the medium behind all faces.
+#[derive(Default)]
+struct Open<'a> {
+    triangles: Vec<Triangle>,
+    /// The shapes, each with the number of its first triangle.
+    shapes: Vec<(usize, &'a Element)>,
+}
+
+impl<'a> Open<'a> {
+    fn add(&mut self, triangles: &[Triangle], turned: bool, element: &'a Element) {
+        self.shapes.push((self.triangles.len(), element));
+        self.triangles.extend(triangles.iter().map(|t| {
+            let [a, b, c] = t.vertices;
+            Triangle { vertices: if turned { [a, c, b] } else { [a, b, c] } }
+        }));
+    }
+
+    fn check(&self) -> Result<(), SceneError> {
+        let Some(hole) = seams::hole(&self.triangles) else { return Ok(()) };
+        let shape = self.shapes.partition_point(|(first, _)| *first <= hole.triangle);
+        let Some((_, element)) = self.shapes.get(shape.saturating_sub(1)) else { return Ok(()) };
         let [a, b] = hole.edge;
         let edge = format!("the edge from ({}, {}, {}) to ({}, {}, {})", a.x, a.y, a.z, b.x, b.y, b.z);
-        return Err(if hole.is_border {
+        Err(if hole.is_border {
             let message = format!("the medium boundary is open: {edge} has a face on one side only");
             element.at.error(message, "close the surface there: fog must be inside of something")
         } else {
             let message = format!("the faces of the medium boundary are wound against each other at {edge}");
             element.at.error(message, "make all normals point outward, as by \"recalculate normals\" in a modeller")
-        });
+        })
     }
-    Ok(closed)
 }
 
 fn wrong_around_camera(around: &Closed<'_>, sensor: &PerspectiveSensor, sensor_at: &Place) -> SceneError {
@@ -83,10 +124,23 @@ fn wrong_around_camera(around: &Closed<'_>, sensor: &PerspectiveSensor, sensor_a
     )
 }
 
+fn medium(loader: &Loader<'_>, id: Option<MediumId>) -> Option<Medium> {
+    id.and_then(|MediumId(i)| loader.media.get(i as usize)).copied()
+}
+
 /// Equal by value: two copies of one fog are one fog.
 fn same(loader: &Loader<'_>, a: Option<MediumId>, b: Option<MediumId>) -> bool {
-    let medium = |id: Option<MediumId>| id.and_then(|MediumId(i)| loader.media.get(i as usize));
-    medium(a) == medium(b)
+    medium(loader, a) == medium(loader, b)
+}
+
+/// The bits of a medium.
+fn key(Medium { sigma_t, albedo, phase }: Medium) -> ([u64; 2], [u32; 3]) {
+    // No mean cosine has the bits of 2.
+    let g = match phase {
+        Phase::Isotropic => 2.0,
+        Phase::HenyeyGreenstein { g } => g,
+    };
+    ([sigma_t, g].map(f64::to_bits), albedo.to_array().map(f32::to_bits))
 }
 
 /// Each boundary with those around it and those that it crosses.

@@ -13,6 +13,8 @@ const SEAM: f64 = 1e-5;
 pub(super) struct Hole {
     /// The ends of the edge.
     pub(super) edge: [Vec3; 2],
+    /// The number of the first triangle with that edge.
+    pub(super) triangle: usize,
     /// True if the edge has a face on one side only; false if its faces are wound against each other.
     pub(super) is_border: bool,
 }
@@ -30,7 +32,7 @@ pub(super) fn hole(triangles: &[Triangle]) -> Option<Hole> {
     let unbalanced = if names.is_empty() { unbalanced } else { self::unbalanced(triangles, &names) };
     let (edge, uses) = unbalanced.into_iter().min_by_key(|(_, uses)| uses.first)?;
     let position = |key: Key| Vec3::from_array(key.map(f32::from_bits));
-    Some(Hole { edge: [position(edge.0), position(edge.1)], is_border: uses.count == 1 })
+    Some(Hole { edge: [position(edge.0), position(edge.1)], triangle: uses.first, is_border: uses.count == 1 })
 }
 
 #[derive(Clone, Copy, Debug, Default)]

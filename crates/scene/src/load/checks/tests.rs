@@ -58,6 +58,35 @@ fn an_open_boundary_is_refused_with_the_place_of_its_hole() {
     assert!(load_with(&with_sensor(&format!("{FOG}\n{nothing}"), AWAY), &[], &[]).is_ok());
 }
 
+/// In Mitsuba a wall between two media is a shape with a medium on each side. Its shapes are open, but not together.
+#[test]
+fn shapes_that_close_together_may_be_open() {
+    let half = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\n";
+    let other = half.replace("v 1 0 0", "v -1 0 0").replace("f 1 3 2\nf 1 2 4\nf 2 3 4", "f 1 2 3\nf 1 4 2\nf 2 4 3");
+    // At x = 0, its normal along +x.
+    let wall = "v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n";
+    let shape = |file: &str, media: &str| {
+        format!(
+            "<shape type='obj'><string name='filename' value='{file}'/><boolean name='face_normals' value='true'/>\
+             <bsdf type='null'/>{media}</shape>\n"
+        )
+    };
+    let between = |medium: &str| {
+        let sides = format!("<ref id='{medium}' name='interior'/><ref id='fog' name='exterior'/>");
+        let body = format!(
+            "{FOG}{OTHER}\n{}{}{}",
+            shape("half", "<ref id='fog' name='interior'/>"),
+            shape("other", "<ref id='other' name='interior'/>"),
+            shape("wall", &sides)
+        );
+        load_with(&with_sensor(&body, AWAY), &[("half", half), ("other", &other), ("wall", wall)], &[])
+    };
+    let scene = between("other").unwrap_or_else(|e| panic!("{e}"));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let message = between("fog").unwrap_err().to_string();
+    assert!(message.contains("the medium boundary is open"), "{message}");
+}
+
 #[test]
 fn crossing_boxes_of_different_media_are_warned_about() {
     let first = fog_box("fog", "<scale value='2'/>", "");
