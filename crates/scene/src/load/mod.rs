@@ -16,6 +16,8 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
+mod tests_hostile;
+#[cfg(test)]
 mod tests_mitsuba;
 mod transform;
 mod xml;

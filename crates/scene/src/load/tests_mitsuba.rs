@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::LoadOptions;
-use super::tests::{FILM, FOG, HEAD, file, load, load_with, refused, refused_text, with_sensor};
+use super::tests::{FILM, FOG, HEAD, LIGHT, file, load, load_with, refused, refused_text, with_sensor};
 use crate::{ComponentFormat, Emitter, IntegratorSettings, ReconstructionFilter, Scene, SceneSource};
 
 fn warned(scene: &Scene, part: &str) -> bool {
@@ -13,8 +13,6 @@ fn warned(scene: &Scene, part: &str) -> bool {
 fn with_integrator(integrator: &str, more: &str) -> String {
     format!("<scene version='3.0.0'>{integrator}<sensor type='perspective'>{FILM}</sensor>{LIGHT}{more}</scene>")
 }
-
-const LIGHT: &str = "<emitter type='point'/>";
 
 #[test]
 fn integrators_that_do_the_same_are_read() {
