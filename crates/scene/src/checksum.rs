@@ -11,8 +11,8 @@ use crate::{
 impl Scene {
     /// The CRC-32 (IEEE) of the scene as it is rendered: all shapes, media, emitters, the camera, the film and the depth limits, bit by
     /// bit, with parameters and transforms resolved. So it changes with a mesh, a parameter or a number of the file, but not
-    /// with its layout, its names or its place. The samples per pixel, the seed and the crop are left out: they
-    /// say how the scene is looked at.
+    /// with its layout, its names or its place. The samples per pixel, the seed, the crop and the format of
+    /// the file are left out: they say how the scene is looked at.
     ///
     /// Meant to tell scenes apart that were changed by accident; 32 bits are no protection against intent. Cost: some
     /// milliseconds for a million triangles.
@@ -138,7 +138,8 @@ impl Sum {
         self.option(medium.map(|MediumId(n)| n));
     }
 
-    fn film(&mut self, FilmSettings { width, height, crop: PixelRect { .. }, filter }: &FilmSettings) {
+    fn film(&mut self, film: &FilmSettings) {
+        let FilmSettings { width, height, crop: PixelRect { .. }, filter, component_format: _ } = film;
         self.words(&[*width, *height]);
         match *filter {
             ReconstructionFilter::Box => self.words(&[0]),
@@ -146,6 +147,16 @@ impl Sum {
                 self.words(&[1]);
                 self.doubles(&[stddev]);
             }
+            ReconstructionFilter::Tent { radius } => {
+                self.words(&[2]);
+                self.doubles(&[radius]);
+            }
+            ReconstructionFilter::Mitchell { b, c } => {
+                self.words(&[3]);
+                self.doubles(&[b, c]);
+            }
+            ReconstructionFilter::CatmullRom => self.words(&[4]),
+            ReconstructionFilter::Lanczos { lobes } => self.words(&[5, lobes]),
         }
     }
 }

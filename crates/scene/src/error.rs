@@ -2,12 +2,16 @@
 
 use std::path::PathBuf;
 
+use crate::text::shown;
+
 /// Why a scene could not be loaded.
+///
+/// The fields may hold anything that a file holds. The text of the error, by `Display`, is short, and every control character in it is escaped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A scene file says something that is wrong or not supported.
-    #[error("{}:{line}:{column}: {message}{}", path.display(), help_line(help))]
+    #[error("{}:{line}:{column}: {}{}", shown(&path.display()), shown(message), help_line(help))]
     Element {
         /// The file, as it was named by the user or by the file that includes it.
         path: PathBuf,
@@ -21,7 +25,7 @@ pub enum SceneError {
         help: String,
     },
     /// A file of the scene could not be read.
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {}", shown(&path.display()), shown(message))]
     File {
         /// The file.
         path: PathBuf,
@@ -29,7 +33,7 @@ pub enum SceneError {
         message: String,
     },
     /// A parameter that the caller defined is malformed, or the scene never uses it.
-    #[error("parameter {name}: {message}{}", help_line(help))]
+    #[error("parameter {}: {}{}", shown(name), shown(message), help_line(help))]
     Define {
         /// The name that was defined.
         name: String,
@@ -41,5 +45,5 @@ pub enum SceneError {
 }
 
 fn help_line(help: &str) -> String {
-    if help.is_empty() { String::new() } else { format!("\n  help: {help}") }
+    if help.is_empty() { String::new() } else { format!("\n  help: {}", shown(help)) }
 }

@@ -24,13 +24,15 @@ mod checksum;
 mod error;
 mod load;
 mod model;
+mod obj;
 mod source;
+mod text;
 
 pub use error::SceneError;
 pub use load::LoadOptions;
 pub use model::{
-    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
-    ReconstructionFilter, Scene, Surface,
+    Boundary, Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor,
+    Phase, PixelRect, ReconstructionFilter, Scene, Surface,
 };
 pub use source::{EmbeddedFile, SceneSource};
 

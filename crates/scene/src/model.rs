@@ -139,6 +139,17 @@ pub struct FilmSettings {
     pub crop: PixelRect,
     /// Reconstruction filter.
     pub filter: ReconstructionFilter,
+    /// How the image is stored; Mitsuba's default is `Float16`.
+    pub component_format: ComponentFormat,
+}
+
+/// The numbers of an image file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ComponentFormat {
+    /// Half precision: about three digits, at most 65,504.
+    Float16,
+    /// Single precision.
+    Float32,
 }
 
 /// A rectangle of pixels, half open: `x0 ≤ x < x1`, `y0 ≤ y < y1`; (0, 0) is the top left pixel.
@@ -163,6 +174,25 @@ pub enum ReconstructionFilter {
     Gaussian {
         /// Standard deviation σ in pixels; positive.
         stddev: f64,
+    },
+    /// max(0, 1 − |x|/r) in x and in y.
+    Tent {
+        /// Radius r in pixels; positive.
+        radius: f64,
+    },
+    /// The cubic filters of Mitchell and Netravali (1988), with a radius of 2 pixels; negative in parts.
+    Mitchell {
+        /// Their parameter B; 1/3 by default.
+        b: f64,
+        /// Their parameter C; 1/3 by default.
+        c: f64,
+    },
+    /// Mitchell with B = 0 and C = 1/2.
+    CatmullRom,
+    /// sinc(x) · sinc(x/lobes) in x and in y, for |x| < lobes; negative in parts.
+    Lanczos {
+        /// Radius in pixels; at least 1, 3 by default.
+        lobes: u32,
     },
 }
 

@@ -1,7 +1,7 @@
 //! Where the files of a scene come from: the disk, or a table inside the program.
 
 use std::borrow::Cow;
-use std::io;
+use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::{Component, Path, PathBuf};
 
 /// One file of an embedded scene.
@@ -49,15 +49,55 @@ impl SceneSource {
         self.embedded.as_deref().unwrap_or_default()
     }
 
-    /// Reads a file of the scene.
-    pub(super) fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
-        let Some(files) = &self.embedded else { return std::fs::read(path) };
+    /// True if the scene has a file of that name, whatever it is.
+    pub(crate) fn has(&self, path: &Path) -> bool {
+        match &self.embedded {
+            None => path.exists(),
+            Some(_) => self.find(path).is_some(),
+        }
+    }
+
+    /// True if the scene has a folder of that name.
+    pub(crate) fn has_folder(&self, path: &Path) -> bool {
+        match &self.embedded {
+            None => path.is_dir(),
+            Some(files) => {
+                let wanted = normalized(path);
+                files.iter().any(|file| normalized(Path::new(file.path.as_ref())).starts_with(&wanted))
+            }
+        }
+    }
+
+    /// Opens a file of the scene that has at most `most` bytes, and says how many. Only plain files are opened: a pipe could block forever, and a device might
+    /// never end.
+    pub(crate) fn open(&self, path: &Path, most: u64) -> io::Result<(Box<dyn BufRead + '_>, u64)> {
+        let too_large = |size: u64| io::Error::other(format!("it has {size} bytes; at most {most} are read"));
+        if self.embedded.is_some() {
+            let file = self
+                .find(path)
+                .ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "no such file in the embedded scene"))?;
+            let bytes = file.text.as_bytes();
+            let size = bytes.len() as u64;
+            return if size > most { Err(too_large(size)) } else { Ok((Box::new(bytes), size)) };
+        }
+        let metadata = std::fs::metadata(path)?;
+        if metadata.is_dir() {
+            return Err(io::Error::other("it is a folder"));
+        }
+        if !metadata.is_file() {
+            return Err(io::Error::other("it is a pipe or a device: save its contents to a file first"));
+        }
+        if metadata.len() > most {
+            return Err(too_large(metadata.len()));
+        }
+        // A file can grow while it is read, and some files of the system claim to be empty.
+        let bounded = std::fs::File::open(path)?.take(most);
+        Ok((Box::new(BufReader::with_capacity(1 << 16, bounded)), metadata.len()))
+    }
+
+    fn find(&self, path: &Path) -> Option<&EmbeddedFile> {
         let wanted = normalized(path);
-        files
-            .iter()
-            .find(|file| normalized(Path::new(file.path.as_ref())) == wanted)
-            .map(|file| file.text.as_bytes().to_vec())
-            .ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "no such file in the embedded scene"))
+        self.files().iter().find(|file| normalized(Path::new(file.path.as_ref())) == wanted)
     }
 }
 

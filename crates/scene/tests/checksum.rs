@@ -7,7 +7,8 @@ use vdf_scenes::builtin;
 
 fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
     let defines = defines.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
-    Scene::from_source(&builtin(name).expect("it is built in"), &LoadOptions { defines }).expect("it loads")
+    Scene::from_source(&builtin(name).expect("it is built in"), &LoadOptions { defines, sensor: None })
+        .expect("it loads")
 }
 
 #[test]

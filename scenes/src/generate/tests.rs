@@ -35,7 +35,7 @@ fn checksum(scene: GeneratedScene) -> u64 {
 
 fn scene(name: &str, defines: &[(&str, &str)]) -> Scene {
     let defines = defines.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
-    Scene::from_source(&builtin(name).unwrap(), &LoadOptions { defines }).unwrap()
+    Scene::from_source(&builtin(name).unwrap(), &LoadOptions { defines, ..LoadOptions::default() }).unwrap()
 }
 
 /// The same bytes on every platform. Whoever changes a scene on purpose changes these numbers.

@@ -1,14 +1,17 @@
-//! Sensor, film, filter, sampler and integrator.
+//! The sensor and its sampler.
 
 use glam::{DMat3, DMat4};
 
 use super::document::Element;
 use super::properties::Object;
-use super::{Loader, objects};
+use super::{Loader, film, objects};
 use crate::SceneError;
-use crate::{FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect, ReconstructionFilter};
+use crate::{FilmSettings, PerspectiveSensor};
 
-const MAX_FILM_SIZE: i64 = 1 << 16;
+/// A matrix written with three digits is this far from a rotation in the products of its columns; a scale of 0.1 % is farther.
+const MOST_SCALE: f64 = 2e-3;
+/// Less is the rounding of single precision, which nobody needs to hear of.
+const LEAST_TO_WARN: f64 = 1e-6;
 
 /// The sensor with what is nested in it: film, samples per pixel, seed.
 #[derive(Debug)]
@@ -22,11 +25,13 @@ pub(super) struct Camera {
 /// Reads the sensor.
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<Camera, SceneError> {
     let mut object = Object::new(loader, element, &["perspective"])?;
-    let world_from_camera = object.world_transform()?;
-    if !is_rigid(world_from_camera) {
-        return Err(object.place_of("to_world").error("to_world of the sensor scales", "only rotate and translate it"));
-    }
-    for name in ["principal_point_offset_x", "principal_point_offset_y", "shutter_open", "shutter_close"] {
+    let world_from_camera = object.world_transform(loader)?;
+    let world_from_camera = rigid(loader, &object, world_from_camera)?;
+    object.without_effect(
+        loader,
+        &["focus_distance", "shutter_open", "shutter_close", "sample_border", "use_radiance"],
+    )?;
+    for name in ["principal_point_offset_x", "principal_point_offset_y"] {
         object.float_where(name, 0.0, |v| v == 0.0, "0: nothing else is supported")?;
     }
     let near_clip = object.float_where("near_clip", 0.01, |v| v > 0.0, "positive")?;
@@ -34,7 +39,7 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let Some(film) = object.at_most_one("film")? else {
         return Err(object.error("no film", "add <film type=\"hdrfilm\"> to the sensor"));
     };
-    let film = read_film(loader, film.object)?;
+    let film = film::read(loader, film.object)?;
     let (sample_count, seed) = match object.at_most_one("sampler")? {
         Some(nested) => sampler(loader, nested.object)?,
         None => (4, 0),
@@ -49,9 +54,28 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     Ok(Camera { sensor, film, sample_count, seed })
 }
 
-fn is_rigid(m: DMat4) -> bool {
+/// The transform without what its digits lost: its axes become unit vectors at right angles. Mitsuba takes such a matrix as it is; a
+/// camera that scales is refused by both.
+fn rigid(loader: &Loader<'_>, object: &Object<'_>, m: DMat4) -> Result<DMat4, SceneError> {
     let linear = DMat3::from_mat4(m);
-    (linear.transpose() * linear).abs_diff_eq(DMat3::IDENTITY, 1e-4)
+    let product = linear.transpose() * linear - DMat3::IDENTITY;
+    let error = product.to_cols_array().into_iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    if error.is_nan() || error > MOST_SCALE {
+        let help = "only rotate and translate it; an axis of <rotate> must have length 1";
+        return Err(object.place_of("to_world").error("to_world of the sensor scales", help));
+    }
+    if error > LEAST_TO_WARN {
+        let message =
+            format!("to_world of the sensor is a rotation only up to {error:.0e}: its axes were made orthonormal");
+        loader.warn(object.place_of("to_world"), &message);
+    } else if error < 1e-12 {
+        return Ok(m);
+    }
+    let forward = linear.z_axis.normalize();
+    let left = (linear.x_axis - linear.x_axis.dot(forward) * forward).normalize();
+    // A mirroring stays one.
+    let up = forward.cross(left) * linear.determinant().signum();
+    Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), forward.extend(0.0), m.w_axis))
 }
 
 /// tan(X/2), X the horizontal field of view.
@@ -72,6 +96,10 @@ fn field_of_view(object: &mut Object<'_>, aspect: f64) -> Result<f64, SceneError
             _ => tan,
         });
     }
+    if object.has("fov_axis") {
+        let help = "add \"fov\", or remove it: the axis of a focal length is the diagonal";
+        return Err(object.place_of("fov_axis").error("\"fov_axis\" without \"fov\"", help));
+    }
     // A focal length is that of a 36 × 24 mm frame, whose diagonal counts.
     object.float("fov")?;
     let text = focal_length.unwrap_or("50mm");
@@ -80,50 +108,6 @@ fn field_of_view(object: &mut Object<'_>, aspect: f64) -> Result<f64, SceneError
         object.place_of("focal_length").error(format!("\"{text}\" is not a focal length"), "write it as in 50mm")
     })?;
     Ok(from_diagonal(f64::hypot(36.0, 24.0) / (2.0 * f)))
-}
-
-fn read_film<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<FilmSettings, SceneError> {
-    let mut object = Object::new(loader, element, &["hdrfilm"])?;
-    let width = object.integer("width", 768, 1..=MAX_FILM_SIZE)?;
-    let height = object.integer("height", 576, 1..=MAX_FILM_SIZE)?;
-    let x0 = object.integer("crop_offset_x", 0, 0..=width - 1)?;
-    let y0 = object.integer("crop_offset_y", 0, 0..=height - 1)?;
-    // The default of the size reaches beyond the film if there is an offset: Mitsuba refuses that, and so do we.
-    let crop_width = object.integer("crop_width", width, 1..=width)?;
-    let crop_height = object.integer("crop_height", height, 1..=height)?;
-    if x0 + crop_width > width || y0 + crop_height > height {
-        return Err(object.error("the crop window reaches beyond the film", "crop_offset + crop size ≤ film size"));
-    }
-    object.choice("file_format", "openexr", &["openexr"])?;
-    object.choice("pixel_format", "rgb", &["rgb"])?;
-    object.choice("component_format", "float16", &["float16", "float32"])?;
-    object.boolean("banner", true)?;
-    object.boolean("compensate", false)?;
-    object.fixed("sample_border", false)?;
-    let filter = match object.at_most_one("rfilter")? {
-        Some(nested) => read_filter(loader, nested.object)?,
-        None => ReconstructionFilter::Gaussian { stddev: 0.5 },
-    };
-    object.finish()?;
-    let crop = PixelRect { x0: pixels(x0), y0: pixels(y0), x1: pixels(x0 + crop_width), y1: pixels(y0 + crop_height) };
-    Ok(FilmSettings { width: pixels(width), height: pixels(height), crop, filter })
-}
-
-/// Only for numbers that were checked to be within the film.
-fn pixels(n: i64) -> u32 {
-    u32::try_from(n).unwrap_or(0)
-}
-
-fn read_filter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<ReconstructionFilter, SceneError> {
-    let mut object = Object::new(loader, element, &["box", "gaussian"])?;
-    let filter = if object.kind() == "box" {
-        ReconstructionFilter::Box
-    } else {
-        let stddev = object.float_where("stddev", 0.5, |v| v > 0.0 && v <= 64.0, "positive and at most 64")?;
-        ReconstructionFilter::Gaussian { stddev }
-    };
-    object.finish()?;
-    Ok(filter)
 }
 
 /// Samples per pixel and seed. All of Mitsuba's samplers stand for ours.
@@ -140,18 +124,4 @@ fn sampler<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<(u32, u64), 
     }
     object.finish()?;
     Ok((u32::try_from(count).unwrap_or(u32::MAX), seed.unsigned_abs()))
-}
-
-/// Reads the integrator.
-pub(super) fn integrator<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<IntegratorSettings, SceneError> {
-    let mut object = Object::new(loader, element, &["volpath"])?;
-    let max_depth = u32::try_from(object.integer("max_depth", -1, -1..=i64::from(u32::MAX))?).ok();
-    let rr_depth = object.integer("rr_depth", 5, 1..=i64::from(u32::MAX))?;
-    object.fixed("hide_emitters", false)?;
-    object.float_where("timeout", -1.0, |v| v <= 0.0, "-1: no time limit")?;
-    // How Mitsuba cuts up its work; no meaning here.
-    object.integer("block_size", 0, 0..=i64::MAX)?;
-    object.integer("samples_per_pass", 0, 0..=i64::MAX)?;
-    object.finish()?;
-    Ok(IntegratorSettings { max_depth, rr_depth: u32::try_from(rr_depth).unwrap_or(u32::MAX) })
 }

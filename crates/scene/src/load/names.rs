@@ -1,4 +1,4 @@
-//! Hints for names: spelling, the old format's names, and options that belong on the command line.
+//! Hints for names: spelling, the old format's names, and options of the renderer.
 
 use std::fmt::Write as _;
 
@@ -12,28 +12,21 @@ const OLD_NAMES: [(&str, &str); 6] = [
     ("lookAt", "write lookat"),
 ];
 
-/// What `vdf` takes on the command line only.
-const COMMAND_LINE: [(&str, &str); 8] = [
-    ("method", "--method"),
-    ("voxel", "--voxel"),
-    ("voxel_size", "--voxel"),
-    ("samples_per_segment", "--samples-per-segment"),
-    ("threads", "-j"),
-    ("crop", "--crop (or crop_offset_x, crop_offset_y, crop_width and crop_height of the film)"),
-    ("spp", "--spp (or sample_count of the sampler)"),
-    ("stats", "--stats"),
-];
+/// Options of the renderer, which are no part of a scene.
+const OPTIONS: [&str; 8] = ["method", "voxel", "voxel_size", "samples_per_segment", "threads", "crop", "spp", "stats"];
 
 /// What to do about a name that would be an error whatever the element is.
 pub(super) fn foreign_name(name: &str) -> Option<(String, String)> {
     if let Some((_, help)) = OLD_NAMES.iter().find(|(old, _)| *old == name) {
         return Some((format!("\"{name}\" is a name of Mitsuba 0.6"), (*help).to_owned()));
     }
-    if let Some((_, flag)) = COMMAND_LINE.iter().find(|(option, _)| *option == name) {
-        return Some((
-            format!("\"{name}\" is not a property of a scene file"),
-            format!("this option of vdf is given on the command line: {flag}"),
-        ));
+    if OPTIONS.contains(&name) {
+        let help = match name {
+            "spp" => "write sample_count inside the <sampler>",
+            "crop" => "write crop_offset_x, crop_offset_y, crop_width and crop_height inside the <film>",
+            _ => "it is an option of the renderer: remove it here, and give it to the program",
+        };
+        return Some((format!("\"{name}\" is not a property of a scene file"), help.to_owned()));
     }
     let starts_lower = name.chars().next().is_some_and(|c| c.is_ascii_lowercase());
     if starts_lower && name.chars().any(|c| c.is_ascii_uppercase()) {
@@ -49,17 +42,34 @@ pub(super) fn foreign_name(name: &str) -> Option<(String, String)> {
     None
 }
 
+/// Longer names are not compared, and more names are not looked at: the cost of a comparison grows with the product of the lengths.
+const MAX_COMPARED_LENGTH: usize = 64;
+const MAX_COMPARED: usize = 10_000;
+/// More names are not listed.
+const MAX_LISTED: usize = 40;
+
 /// "did you mean …? supported: …", for a name that is none of `known`.
 pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     let mut help = String::new();
-    let nearest = known.iter().min_by_key(|k| strsim::damerau_levenshtein(name, k));
-    if let Some(nearest) = nearest.filter(|n| strsim::damerau_levenshtein(name, n) <= 1 + n.len() / 4) {
+    let comparable = |name: &str| name.len() <= MAX_COMPARED_LENGTH;
+    let nearest = known
+        .iter()
+        .take(MAX_COMPARED)
+        .filter(|k| comparable(name) && comparable(k))
+        .map(|k| (strsim::damerau_levenshtein(name, k), k))
+        .min_by_key(|(distance, _)| *distance);
+    if let Some((_, nearest)) = nearest.filter(|(distance, nearest)| *distance <= 1 + nearest.len() / 4) {
         let _ = write!(help, "did you mean \"{nearest}\"? ");
     }
-    if known.is_empty() {
-        help.push_str("there is none here");
-    } else {
-        let _ = write!(help, "supported: {}", known.join(", "));
+    match known {
+        [] => help.push_str("there is none here"),
+        _ if known.len() <= MAX_LISTED => {
+            let _ = write!(help, "supported: {}", known.join(", "));
+        }
+        _ => {
+            let _ =
+                write!(help, "supported: {}, and {} more", known[..MAX_LISTED].join(", "), known.len() - MAX_LISTED);
+        }
     }
     help
 }
@@ -72,7 +82,7 @@ mod tests {
     fn old_and_foreign_names_have_their_own_hint() {
         assert!(foreign_name("sigmaS").is_some_and(|(_, help)| help.contains("albedo")));
         assert!(foreign_name("toWorld").is_some_and(|(_, help)| help.contains("\"to_world\"")));
-        assert!(foreign_name("method").is_some_and(|(_, help)| help.contains("--method")));
+        assert!(foreign_name("method").is_some_and(|(_, help)| help.contains("option of the renderer")));
         assert_eq!(foreign_name("to_world"), None);
         assert_eq!(foreign_name("G"), None);
     }

@@ -6,8 +6,6 @@ use super::properties::Object;
 use crate::{Bsdf, Emitter, Medium, MediumId, Phase};
 use crate::{Rgb, SceneError};
 
-const MOST: f64 = f32::MAX as f64;
-
 /// The medium's index; each is read once, however often it is referred to.
 pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<MediumId, SceneError> {
     if let Some(&id) = loader.medium_of_element.get(&element.serial) {
@@ -16,7 +14,7 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
     let mut object = Object::new(loader, element, &["homogeneous"])?;
     object.fixed("sample_emitters", true)?;
     object.boolean("has_spectral_extinction", true)?;
-    let albedo = object.colour("albedo", 0.75, 1.0)?;
+    let albedo = object.reflectance("albedo", 0.75)?;
     let scale = object.float_where("scale", 1.0, |v| v >= 0.0, "at least 0")?;
     let sigma_t = object.grey("sigma_t", 1.0)?;
     if sigma_t < 0.0 || !(sigma_t * scale).is_finite() {
@@ -59,7 +57,7 @@ pub(super) fn default_bsdf(emits: bool) -> Bsdf {
 pub(super) fn bsdf<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Bsdf>, SceneError> {
     let mut object = Object::new(loader, element, &["diffuse", "twosided", "null"])?;
     let bsdf = match object.kind() {
-        "diffuse" => Some(Bsdf { front: object.colour("reflectance", 0.5, 1.0)?, back: Rgb::ZERO }),
+        "diffuse" => Some(Bsdf { front: object.reflectance("reflectance", 0.5)?, back: Rgb::ZERO }),
         "twosided" => {
             let nested = object.nested("bsdf");
             let (front, back) = match nested.as_slice() {
@@ -80,32 +78,44 @@ pub(super) fn bsdf<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Opti
 
 fn diffuse<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneError> {
     let mut object = Object::new(loader, element, &["diffuse"])?;
-    let reflectance = object.colour("reflectance", 0.5, 1.0)?;
+    let reflectance = object.reflectance("reflectance", 0.5)?;
     object.finish()?;
     Ok(reflectance)
 }
 
-/// An emitter that stands by itself.
-pub(super) fn emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Emitter, SceneError> {
+/// An emitter that stands by itself; `None` for an area light, which shines where a shape refers to it.
+pub(super) fn emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Emitter>, SceneError> {
     let mut object = Object::new(loader, element, &["point", "constant", "area"])?;
     let emitter = match object.kind() {
-        "area" => return Err(object.error("it belongs to no shape", "put it inside the <shape> that shines")),
+        "area" if element.attribute("id").is_none() => {
+            return Err(object.error("it belongs to no shape", "put it inside the <shape> that shines"));
+        }
+        "area" => return area_emitter(loader, element).map(|_| None),
         "point" => {
             if object.has("position") && object.has("to_world") {
                 return Err(object.place_of("to_world").error("both \"position\" and \"to_world\"", "remove one"));
             }
-            let to_world = object.world_transform()?;
+            let to_world = object.world_transform(loader)?;
             let position = object.point("position")?.unwrap_or_else(|| to_world.w_axis.truncate());
-            Emitter::Point { position, intensity: object.colour("intensity", 1.0, MOST)? }
+            Emitter::Point { position, intensity: object.emission("intensity")? }
         }
-        _ => Emitter::Constant { radiance: object.colour("radiance", 1.0, MOST)? },
+        _ => Emitter::Constant { radiance: object.emission("radiance")? },
     };
     sampling_weight(&mut object)?;
     object.finish()?;
-    Ok(emitter)
+    Ok(Some(emitter))
+}
+
+/// The radiance of an area light.
+pub(super) fn area_emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneError> {
+    let mut object = Object::new(loader, element, &["area"])?;
+    let radiance = object.emission("radiance")?;
+    sampling_weight(&mut object)?;
+    object.finish()?;
+    Ok(radiance)
 }
 
 /// vdf chooses emitters uniformly.
-pub(super) fn sampling_weight(object: &mut Object<'_>) -> Result<(), SceneError> {
+fn sampling_weight(object: &mut Object<'_>) -> Result<(), SceneError> {
     object.float_where("sampling_weight", 1.0, |w| w == 1.0, "1: vdf chooses emitters uniformly").map(drop)
 }

@@ -9,6 +9,9 @@ use super::document::{Element, Place};
 use super::{names, transform};
 use crate::{Rgb, SceneError};
 
+/// The colour of the spectrum that is 1 at each wavelength, with the primaries of sRGB and its white, D65; as Mitsuba 3.9.1 has it.
+const EQUAL_ENERGY: DVec3 = DVec3::new(1.204_793_93, 0.948_291, 0.908_916_06);
+
 /// A nested object, or one that a `ref` stands for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nested<'a> {
@@ -168,7 +171,7 @@ impl<'a> Object<'a> {
         choices: &[&'static str],
     ) -> Result<&'static str, SceneError> {
         let Some(value) = self.string(name)? else { return Ok(default) };
-        choices.iter().copied().find(|&c| c == value).ok_or_else(|| {
+        choices.iter().copied().find(|&c| c == value.to_ascii_lowercase()).ok_or_else(|| {
             self.place_of(name).error(format!("{name} \"{value}\" is not supported"), names::suggest(value, choices))
         })
     }
@@ -182,10 +185,34 @@ impl<'a> Object<'a> {
         Err(self.place_of(name).error(message, format!("only {only} is; leave it out")))
     }
 
-    /// A colour, each channel at least 0 and at most `most`; `<float>` makes a grey.
-    pub(super) fn colour(&mut self, name: &'static str, default: f32, most: f64) -> Result<Rgb, SceneError> {
-        let Some(element) = self.property(name, &["rgb", "float"])? else { return Ok(Rgb::splat(default)) };
-        let values = if element.tag == "rgb" { rgb(element)? } else { DVec3::splat(number(element)?) };
+    /// Properties of Mitsuba's that change nothing here; a warning says so.
+    pub(super) fn without_effect(&mut self, loader: &Loader<'_>, names: &[&'static str]) -> Result<(), SceneError> {
+        for name in names {
+            if let Some(element) = self.property(name, &["float", "integer", "boolean", "string"])? {
+                loader.warn(&element.at, &format!("\"{name}\" of {} has no effect here", self.describe()));
+            }
+        }
+        Ok(())
+    }
+
+    /// A reflectance or albedo, each channel in [0, 1]; `<float>` and `<spectrum>` make a grey.
+    pub(super) fn reflectance(&mut self, name: &'static str, default: f32) -> Result<Rgb, SceneError> {
+        self.colour(name, default, 1.0, DVec3::ONE)
+    }
+
+    /// What an emitter emits. `<float>` makes a grey. A `<spectrum>` is as bright at each wavelength, which is not white:
+    /// white is daylight, which is weaker in red.
+    pub(super) fn emission(&mut self, name: &'static str) -> Result<Rgb, SceneError> {
+        self.colour(name, 1.0, f64::from(f32::MAX), EQUAL_ENERGY)
+    }
+
+    fn colour(&mut self, name: &'static str, default: f32, most: f64, spectrum: DVec3) -> Result<Rgb, SceneError> {
+        let Some(element) = self.property(name, &["rgb", "float", "spectrum"])? else { return Ok(Rgb::splat(default)) };
+        let values = match element.tag.as_str() {
+            "rgb" => rgb(element)?,
+            "spectrum" => constant_spectrum(element)? * spectrum,
+            _ => DVec3::splat(number(element)?),
+        };
         if values.cmpge(DVec3::ZERO).all() && values.cmple(DVec3::splat(most)).all() {
             return Ok(values.as_vec3());
         }
@@ -198,9 +225,11 @@ impl<'a> Object<'a> {
 
     /// A number, or a colour whose channels are equal.
     pub(super) fn grey(&mut self, name: &'static str, default: f64) -> Result<f64, SceneError> {
-        let Some(element) = self.property(name, &["float", "rgb"])? else { return Ok(default) };
-        if element.tag == "float" {
-            return number(element);
+        let Some(element) = self.property(name, &["float", "rgb", "spectrum"])? else { return Ok(default) };
+        match element.tag.as_str() {
+            "float" => return number(element),
+            "spectrum" => return constant_spectrum(element),
+            _ => {}
         }
         let value = rgb(element)?;
         if value.x != value.y || value.y != value.z {
@@ -231,8 +260,9 @@ impl<'a> Object<'a> {
     }
 
     /// The `to_world` transform; the identity if there is none.
-    pub(super) fn world_transform(&mut self) -> Result<DMat4, SceneError> {
-        self.property("to_world", &["transform"])?.map_or(Ok(DMat4::IDENTITY), transform::read)
+    pub(super) fn world_transform(&mut self, loader: &Loader<'_>) -> Result<DMat4, SceneError> {
+        let element = self.property("to_world", &["transform"])?;
+        element.map_or(Ok(DMat4::IDENTITY), |element| transform::read(loader, element))
     }
 
     /// The nested objects with that tag, in order.
@@ -280,6 +310,17 @@ fn number(element: &Element) -> Result<f64, SceneError> {
         return parse_integer(element).map(|i| i as f64);
     }
     transform::parse(element.require("value")?, &element.at)
+}
+
+fn constant_spectrum(element: &Element) -> Result<f64, SceneError> {
+    let text = element.require("value")?;
+    if text.contains(':') || text.trim().contains([',', ' ']) {
+        return Err(element.at.error(
+            "a <spectrum> over wavelengths is not supported",
+            "write one number, or the colour as <rgb name=\"…\" value=\"red, green, blue\"/>",
+        ));
+    }
+    transform::parse(text, &element.at)
 }
 
 fn parse_integer(element: &Element) -> Result<i64, SceneError> {

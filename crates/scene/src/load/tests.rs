@@ -7,32 +7,32 @@ use glam::{DVec3, Vec3};
 use super::LoadOptions;
 use crate::{EmbeddedFile, Emitter, Phase, Scene, SceneError, SceneSource};
 
-const HEAD: &str = "<scene version='3.0.0'>\n<integrator type='volpath'/>\n";
-const FILM: &str = "<film type='hdrfilm'/>";
-const FOG: &str = "<medium type='homogeneous' id='fog'/>";
-const LIGHT: &str = "<emitter type='point'/>";
+pub(super) const HEAD: &str = "<scene version='3.0.0'>\n<integrator type='volpath'/>\n";
+pub(super) const FILM: &str = "<film type='hdrfilm'/>";
+pub(super) const FOG: &str = "<medium type='homogeneous' id='fog'/>";
+pub(super) const LIGHT: &str = "<emitter type='point'/>";
 
-fn file(path: &str, text: &str) -> EmbeddedFile {
+pub(super) fn file(path: &str, text: &str) -> EmbeddedFile {
     EmbeddedFile { path: Cow::Owned(path.to_owned()), text: Cow::Owned(text.to_owned()) }
 }
 
-fn load_with(text: &str, others: &[(&str, &str)], defines: &[(&str, &str)]) -> Result<Scene, SceneError> {
+pub(super) fn load_with(text: &str, others: &[(&str, &str)], defines: &[(&str, &str)]) -> Result<Scene, SceneError> {
     let others = others.iter().map(|(p, t)| file(p, t)).collect();
     let defines = defines.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
-    Scene::from_source(&SceneSource::embedded(file("s.xml", text), others), &LoadOptions { defines })
+    Scene::from_source(&SceneSource::embedded(file("s.xml", text), others), &LoadOptions { defines, sensor: None })
 }
 
 /// A scene with a sensor and a light, and `body` from line 3 on.
-fn scene(body: &str) -> String {
+pub(super) fn scene(body: &str) -> String {
     format!("{HEAD}{body}\n<sensor type='perspective'>{FILM}</sensor>{LIGHT}</scene>")
 }
 
-fn load(body: &str) -> Scene {
+pub(super) fn load(body: &str) -> Scene {
     load_with(&scene(body), &[], &[]).unwrap()
 }
 
 #[track_caller]
-fn refused_text(text: &str, others: &[(&str, &str)], place: &str, part: &str) {
+pub(super) fn refused_text(text: &str, others: &[(&str, &str)], place: &str, part: &str) {
     let message = load_with(text, others, &[]).expect_err("this must be refused").to_string();
     assert!(message.starts_with(&format!("{place}: ")), "expected {place} in: {message}");
     assert!(message.contains(part), "expected {part:?} in: {message}");
@@ -40,7 +40,7 @@ fn refused_text(text: &str, others: &[(&str, &str)], place: &str, part: &str) {
 
 /// `body` begins at line 3, column 1.
 #[track_caller]
-fn refused(body: &str, place: &str, part: &str) {
+pub(super) fn refused(body: &str, place: &str, part: &str) {
     refused_text(&scene(body), &[], &format!("s.xml:{place}"), part);
 }
 
@@ -53,7 +53,7 @@ fn fog_cube(size: f64, more: &str) -> String {
 }
 
 /// Everything but the sensor's content at the usual place.
-fn with_sensor(body: &str, sensor: &str) -> String {
+pub(super) fn with_sensor(body: &str, sensor: &str) -> String {
     format!("{HEAD}{body}\n<sensor type='perspective'>{FILM}{sensor}</sensor>{LIGHT}</scene>")
 }
 
@@ -134,11 +134,11 @@ fn unknown_names_are_refused_with_the_nearest_one() {
     refused("<shape type='cube'><string name='flip_normals' value='a'/></shape>", "3:20", "cannot be a <string>");
     refused("<film type='hdrfilm'/>", "3:1", "inside <sensor>");
     refused("<float name='a' value='1'><float name='b' value='1'/></float>", "3:27", "inside <float>");
-    refused("<spectrum name='a' value='1'/>", "3:1", "not supported");
+    refused("<texture name='a' value='1'/>", "3:1", "not supported");
 }
 
 #[test]
-fn old_names_and_command_line_options_have_their_hints() {
+fn old_names_and_options_of_the_renderer_have_their_hints() {
     let medium = |name| format!("<medium type='homogeneous'><float name='{name}' value='1'/></medium>");
     for name in ["sigmaS", "sigma_s", "sigmaA", "sigma_a", "density"] {
         refused(&medium(name), "3:28", "albedo");
@@ -146,7 +146,7 @@ fn old_names_and_command_line_options_have_their_hints() {
     refused("<shape type='cube'><transform name='toWorld'/></shape>", "3:20", "\"to_world\"");
     refused("<integrator type='volpath'><string name='method' value='amr'/></integrator>", "3:1", "second integrator");
     let text = "<scene version='3.0.0'><integrator type='volpath'><string name='method' value='amr'/></integrator><sensor type='perspective'><film type='hdrfilm'/></sensor></scene>";
-    refused_text(text, &[], "s.xml:1:51", "--method");
+    refused_text(text, &[], "s.xml:1:51", "option of the renderer");
     refused_text("<scene version='0.6.0'/>", &[], "s.xml:1:1", "too old");
     refused_text("<scene/>", &[], "s.xml:1:1", "version");
 }
@@ -180,7 +180,7 @@ fn values_outside_their_range_are_refused() {
     refused_text(&film("<integer name='width' value='1.0'/>"), &[], "s.xml:3:49", "not an integer");
     refused_text(&film("<integer name='width' value='0'/>"), &[], "s.xml:3:49", "between 1 and");
     refused_text(&film("<integer name='crop_offset_x' value='9'/>"), &[], "s.xml:3:28", "beyond the film");
-    refused_text(&film("<string name='pixel_format' value='rgba'/>"), &[], "s.xml:3:49", "supported: rgb");
+    refused_text(&film("<string name='pixel_format' value='cmyk'/>"), &[], "s.xml:3:49", "supported: rgb");
 }
 
 #[test]
@@ -208,7 +208,8 @@ fn transforms_apply_in_listed_order() {
     assert_eq!(position("<lookat origin='1 2 3' target='9 9 9'/>"), DVec3::new(1.0, 2.0, 3.0));
     let op = |op: &str| format!("<emitter type='point'><transform name='to_world'>{op}</transform></emitter>");
     refused(&op("<scale x='0'/>"), "3:23", "inverted");
-    refused(&op("<rotate x='2' angle='3'/>"), "3:50", "length 2");
+    refused(&op("<rotate angle='3'/>"), "3:50", "axis is zero");
+    refused(&op("<rotate value='1' x='2' angle='3'/>"), "3:50", "together with");
     refused(&op("<lookat origin='0 0 0' target='0 0 0'/>"), "3:50", "same point");
     refused(&op("<lookat origin='0 0 0' target='0 1 0' up='0 3 0'/>"), "3:50", "parallel");
     refused(&op("<matrix value='1 2'/>"), "3:50", "16 or 9");
@@ -254,11 +255,9 @@ fn obj_files_are_read_or_refused_by_name() {
     assert!(good.warnings[0].contains("face_normals"));
     let bad = |faces: &str, part: &str| refused_text(&text, &[("m.obj", &format!("{v}{faces}"))], "s.xml:3:19", part);
     bad("", "m.obj: the mesh has no faces");
-    bad("f 1 2 9", "m.obj: ");
-    bad("f 1 2 0", "m.obj: ");
-    bad("f 1 x 3", "m.obj: ");
-    bad("v 1 nan 2\nf 1 2 5", "m.obj: ");
-    bad("f 1 -2 3", "m.obj:5: negative");
+    bad("f 1 2 9", "m.obj:5: there is no vertex 9 in \"f 1 2 9\"");
+    bad("f 1 2 0", "m.obj:5: ");
+    bad("v 1 nan 2\nf 1 2 5", "m.obj:5: ");
     refused_text(&text, &[], "s.xml:3:19", "cannot read \"m.obj\"");
 }
 
@@ -310,7 +309,8 @@ fn traps_around_shapes() {
         "\"interior\"",
     );
     refused(&format!("{FOG}\n<shape type='cube'><bsdf type='null'/><ref id='fog'/></shape>"), "4:39", "\"interior\"");
-    refused("<shape type='cube'><bsdf type='null'/><emitter type='area'/></shape>", "3:1", "null BSDF");
+    let glowing = "<shape type='cube'><bsdf type='null'/><emitter type='area'/><medium type='homogeneous' name='interior'/></shape>";
+    refused(glowing, "3:1", "area emitter on the boundary");
     let nothing = load("<shape type='cube'><bsdf type='null'/></shape>");
     assert!(nothing.boundaries.is_empty() && nothing.warnings[0].contains("no effect"));
 }
@@ -326,18 +326,24 @@ fn the_cameras_medium_is_checked() {
     let turned = format!("{FOG}{}", fog_cube(1.0, "<boolean name='flip_normals' value='true'/>"));
     assert!(load_with(&with_sensor(&turned.replace("interior", "exterior"), "<ref id='fog'/>"), &[], &[]).is_ok());
     refused(&turned.replace("interior", "exterior"), "4:1", "camera is inside the medium");
-    let other = with_sensor(&inside, "<medium type='homogeneous'/>");
+    let thick = "<medium type='homogeneous'><float name='sigma_t' value='2'/></medium>";
+    let other = with_sensor(&inside, thick);
     refused_text(&other, &[], "s.xml:4:1", "not the one that is around");
 }
 
 #[test]
 fn fog_must_not_vanish_behind_an_inner_boundary() {
+    let thick = "<medium type='homogeneous' id='thick'><float name='sigma_t' value='2'/></medium>";
+    let cube = |more: &str| {
+        let moved = fog_cube(1.0, more).replace("</transform>", "<translate z='5'/></transform>");
+        moved.replace("id='fog' name='interior'", "id='thick' name='interior'")
+    };
     let nested =
-        |more: &str| with_sensor(&format!("{FOG}{}\n{}", fog_cube(9.0, ""), fog_cube(1.0, more)), "<ref id='fog'/>");
+        |more: &str| with_sensor(&format!("{FOG}{thick}{}\n{}", fog_cube(9.0, ""), cube(more)), "<ref id='fog'/>");
     refused_text(&nested(""), &[], "s.xml:4:1", "would vanish");
     assert!(load_with(&nested("<ref id='fog' name='exterior'/>"), &[], &[]).is_ok());
     let away = "<transform name='to_world'><translate z='-5'/></transform><ref id='fog'/>";
-    refused_text(&with_sensor(&format!("{FOG}\n{}", fog_cube(1.0, "")), away), &[], "s.xml:4:1", "would vanish");
+    refused_text(&with_sensor(&format!("{FOG}{thick}\n{}", cube("")), away), &[], "s.xml:4:1", "would vanish");
 }
 
 #[test]
@@ -353,7 +359,6 @@ fn sensor_film_and_integrator_are_needed_once() {
     refused_text("<scene version='3.0.0'><integrator type='volpath'/></scene>", &[], "s.xml:1:1", "no sensor");
     refused_text(&format!("{HEAD}<sensor type='perspective'/></scene>"), &[], "s.xml:3:1", "no film");
     refused_text("<scene version='3.0.0'><sensor type='perspective'/></scene>", &[], "s.xml:1:1", "no integrator");
-    refused(&format!("<sensor type='perspective'>{FILM}</sensor>"), "4:1", "second sensor");
 }
 
 /// A shape that single precision would make another one is refused; one whose vertices can be said exactly is not, nor one without extent.
@@ -370,4 +375,42 @@ fn a_shape_too_far_from_the_origin_is_refused() {
     for fine in [at("1e7", 5.0), at("10000000.3", 500.0), at("70.1", 0.01), at("0", 1e-40)] {
         load(&fine);
     }
+}
+
+/// The coordinates of maps have seven digits before the point: they are moved to the origin before they are rounded.
+#[test]
+fn a_mesh_far_away_is_moved_before_it_is_rounded() {
+    let mesh = "v -2487000.1 4684683.1 0\nv -2487000 4684683.1 0\nv -2487000 4684683.2 0\nf 1 2 3\n";
+    let text = |more: &str| {
+        scene(&format!(
+            "<shape type='obj'><string name='filename' value='m.obj'/><boolean name='face_normals' value='true'/>{more}</shape>"
+        ))
+    };
+    let near = "<transform name='to_world'><translate x='2487000' y='-4684683'/></transform>";
+    let loaded = load_with(&text(near), &[("m.obj", mesh)], &[]).unwrap();
+    let expected = [Vec3::new(-0.1, 0.1, 0.0), Vec3::new(0.0, 0.1, 0.0), Vec3::new(0.0, 0.2, 0.0)];
+    for (vertex, expected) in loaded.surfaces[0].triangles[0].vertices.iter().zip(expected) {
+        assert!((*vertex - expected).abs().max_element() < 1e-8, "{vertex} {expected}");
+    }
+    refused_text(&text(""), &[("m.obj", mesh)], "s.xml:3:1", "precision exhausted");
+}
+
+#[test]
+fn includes_and_meshes_are_found_in_their_folders() {
+    let leaf = format!("<scene version='3.0.0'>{LIGHT}</scene>");
+    let two = format!("<scene version='3.0.0'>{LIGHT}{LIGHT}</scene>");
+    let outer = "<scene version='3.0.0'><include filename='leaf.xml'/></scene>";
+    let count = |text: &str, others: &[(&str, &str)]| load_with(&scene(text), others, &[]).unwrap().emitters.len() - 1;
+    let nested = "<include filename='a/outer.xml'/>";
+    assert_eq!(count(nested, &[("a/outer.xml", outer), ("a/leaf.xml", &two), ("leaf.xml", &leaf)]), 2);
+    assert_eq!(count(nested, &[("a/outer.xml", outer), ("leaf.xml", &leaf)]), 1);
+    let path = "<path value='p'/><include filename='leaf.xml'/>";
+    assert_eq!(count(path, &[("p/leaf.xml", &leaf)]), 1);
+    assert_eq!(count(path, &[("p/leaf.xml", &leaf), ("leaf.xml", &two)]), 2);
+    let mesh = "<path value='p'/><shape type='obj'><string name='filename' value='m.obj'/></shape>";
+    let one = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let loaded = load_with(&scene(mesh), &[("p/m.obj", one), ("m.obj", &one.repeat(2))], &[]).unwrap();
+    assert_eq!(loaded.surfaces[0].triangles.len(), 1);
+    refused("<path value='q'/>", "3:1", "there is no folder \"q\"");
+    refused("<shape type='cube'><path value='q'/></shape>", "3:20", "directly inside <scene>");
 }

@@ -2,10 +2,11 @@
 
 use glam::{DMat3, DMat4, DVec3};
 
+use super::Loader;
 use super::document::{Element, Place};
 use crate::SceneError;
 
-/// A `rotate` axis this far from unit length is taken for a mistake; a unit axis written with few digits is not.
+/// A `rotate` axis this close to unit length is taken for a unit axis that was written with few digits.
 const AXIS_TOLERANCE: f64 = 1e-3;
 
 /// A finite number.
@@ -24,13 +25,13 @@ pub(super) fn numbers(element: &Element, name: &str) -> Result<Vec<f64>, SceneEr
 }
 
 /// The matrix of a `<transform>`.
-pub(super) fn read(element: &Element) -> Result<DMat4, SceneError> {
+pub(super) fn read(loader: &Loader<'_>, element: &Element) -> Result<DMat4, SceneError> {
     let mut total = DMat4::IDENTITY;
     for child in &element.children {
         let step = match child.tag.as_str() {
             "translate" => DMat4::from_translation(xyz(child, 0.0)?),
             "scale" => DMat4::from_scale(xyz(child, 1.0)?),
-            "rotate" => rotate(child)?,
+            "rotate" => rotate(loader, child)?,
             "lookat" => lookat(child)?,
             "matrix" => matrix(child)?,
             other => {
@@ -55,25 +56,58 @@ fn xyz(element: &Element, missing: f64) -> Result<DVec3, SceneError> {
         if element.attributes.len() > 1 {
             return Err(element.at.error("\"value\" together with other attributes", "write value, or x, y and z"));
         }
-        return match numbers(element, "value")?.as_slice() {
-            [v] => Ok(DVec3::splat(*v)),
-            [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
-            other => Err(element.at.error(format!("\"value\" has {} numbers", other.len()), "write one or three")),
-        };
+        return one_or_three(element);
     }
+    components(element, missing)
+}
+
+/// `value` with one or three numbers.
+fn one_or_three(element: &Element) -> Result<DVec3, SceneError> {
+    match numbers(element, "value")?.as_slice() {
+        [v] => Ok(DVec3::splat(*v)),
+        [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
+        other => Err(element.at.error(format!("\"value\" has {} numbers", other.len()), "write one or three")),
+    }
+}
+
+/// `x`, `y` and `z`, each `missing` if left out.
+fn components(element: &Element, missing: f64) -> Result<DVec3, SceneError> {
     let axis = |name| element.attribute(name).map_or(Ok(missing), |a| parse(&a.value, &a.at));
     Ok(DVec3::new(axis("x")?, axis("y")?, axis("z")?))
 }
 
-fn rotate(element: &Element) -> Result<DMat4, SceneError> {
-    let axis = |name| element.attribute(name).map_or(Ok(0.0), |a| parse(&a.value, &a.at));
-    let axis = DVec3::new(axis("x")?, axis("y")?, axis("z")?);
-    let angle = parse(element.require("angle")?, &element.at)?;
-    // Mitsuba does not normalise the axis: another length would give it a matrix that is no rotation.
-    if (axis.length() - 1.0).abs() > AXIS_TOLERANCE {
-        return Err(element.at.error(format!("the rotation axis has length {}", axis.length()), "write a unit vector"));
+/// Mitsuba does not normalise the axis. With another length than 1 its matrix is no rotation: a quarter turn about an axis of length 2 also
+/// scales by 2. Such a matrix is what its users see, so it is ours, too, with a warning; only an axis that is a unit vector but for its digits is
+/// made one.
+fn rotate(loader: &Loader<'_>, element: &Element) -> Result<DMat4, SceneError> {
+    let angle = parse(element.require("angle")?, &element.at)?.to_radians();
+    let axis = if element.attribute("value").is_some() {
+        if ["x", "y", "z"].iter().any(|name| element.attribute(name).is_some()) {
+            return Err(element.at.error("\"value\" together with \"x\", \"y\" or \"z\"", "write one or the other"));
+        }
+        one_or_three(element)?
+    } else {
+        components(element, 0.0)?
+    };
+    let length = axis.length();
+    if length == 0.0 {
+        return Err(element.at.error("the rotation axis is zero", "write a unit vector, as in y=\"1\""));
     }
-    Ok(DMat4::from_axis_angle(axis.normalize(), angle.to_radians()))
+    if (length - 1.0).abs() <= AXIS_TOLERANCE {
+        return Ok(DMat4::from_axis_angle(axis.normalize(), angle));
+    }
+    loader.warn(
+        &element.at,
+        &format!("the rotation axis has length {length}: as in Mitsuba, the matrix scales, too; a unit vector is probably meant"),
+    );
+    let (sin, cos) = angle.sin_cos();
+    let cross = DMat3::from_cols(
+        DVec3::new(0.0, axis.z, -axis.y),
+        DVec3::new(-axis.z, 0.0, axis.x),
+        DVec3::new(axis.y, -axis.x, 0.0),
+    );
+    let outer = DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+    Ok(DMat4::from_mat3(DMat3::IDENTITY * cos + outer * (1.0 - cos) + cross * sin))
 }
 
 fn three(element: &Element, name: &str) -> Result<DVec3, SceneError> {

@@ -1,0 +1,61 @@
+//! What the clip planes of the camera cut away.
+
+use glam::DVec3;
+use vdf_geometry::{Bounds, Segment, Triangle, intersect_exact};
+
+use super::super::Loader;
+use super::super::document::Place;
+use crate::{FilmSettings, PerspectiveSensor};
+
+/// Rays along each side of the picture that are followed from the camera to the near plane.
+const RAYS: u32 = 5;
+
+/// Warns if a medium boundary is between the camera and the near plane, or nothing is between the clip planes.
+pub(super) fn warn(loader: &Loader<'_>, sensor: &PerspectiveSensor, film: &FilmSettings, at: &Place) {
+    nothing_to_see(loader, sensor, at);
+    let camera = sensor.world_from_camera.w_axis.truncate();
+    let tan_y = sensor.tan_half_fov_x * f64::from(film.height) / f64::from(film.width);
+    let rays: Vec<_> = (0..RAYS * RAYS)
+        .map(|i| {
+            // Not quite to the border: a boundary may begin just where the picture ends.
+            let along = |i: u32| (f64::from(i) + 0.5) / f64::from(RAYS) * 2.0 - 1.0;
+            let (x, y) = (along(i % RAYS) * sensor.tan_half_fov_x, along(i / RAYS) * tan_y);
+            let near = sensor.world_from_camera.transform_point3(DVec3::new(x, y, 1.0) * sensor.near_clip);
+            Segment::new(camera, near)
+        })
+        .collect();
+    let reach = Bounds::of_points(rays.iter().flat_map(|ray| [ray.p, ray.q]));
+    let jumped = loader.boundaries.iter().zip(&loader.boundary_elements).find(|(boundary, _)| {
+        let near = |t: &&Triangle| Bounds::of_triangles([*t]).touches(&reach);
+        boundary.triangles.iter().filter(near).any(|t| rays.iter().any(|ray| intersect_exact(ray, t).is_some()))
+    });
+    if let Some((_, element)) = jumped {
+        loader.warn(
+            at,
+            &format!(
+                "near_clip {} jumps over the medium boundary at {}: rays begin behind it, in the medium of the sensor; make near_clip smaller",
+                sensor.near_clip, element.at
+            ),
+        );
+    }
+}
+
+fn nothing_to_see(loader: &Loader<'_>, sensor: &PerspectiveSensor, at: &Place) {
+    let shapes = || {
+        let surfaces = loader.surfaces.iter().map(|s| &s.triangles);
+        surfaces.chain(loader.boundaries.iter().map(|b| &b.triangles)).filter(|t| !t.is_empty())
+    };
+    let (camera, forward) = (sensor.world_from_camera.w_axis.truncate(), sensor.world_from_camera.z_axis.truncate());
+    let is_seen = |triangles: &Vec<Triangle>| {
+        let depths = triangles.iter().flat_map(|t| t.vertices_f64()).map(|v| (v - camera).dot(forward));
+        let (low, high) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
+        high >= sensor.near_clip && low <= sensor.far_clip
+    };
+    if shapes().next().is_some() && !shapes().any(is_seen) {
+        let message = format!(
+            "nothing of the scene lies between near_clip ({}) and far_clip ({}) in front of the camera",
+            sensor.near_clip, sensor.far_clip
+        );
+        loader.warn(at, &message);
+    }
+}

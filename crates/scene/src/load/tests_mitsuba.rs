@@ -1,0 +1,229 @@
+//! What scenes of Mitsuba say that the rest of the subset does not need.
+
+use glam::{DMat3, DVec3, Vec3};
+
+use super::LoadOptions;
+use super::tests::{FILM, FOG, HEAD, LIGHT, file, load, load_with, refused, refused_text, with_sensor};
+use crate::{ComponentFormat, Emitter, IntegratorSettings, ReconstructionFilter, Scene, SceneSource};
+
+fn warned(scene: &Scene, part: &str) -> bool {
+    scene.warnings.iter().any(|w| w.contains(part))
+}
+
+fn with_integrator(integrator: &str, more: &str) -> String {
+    format!("<scene version='3.0.0'>{integrator}<sensor type='perspective'>{FILM}</sensor>{LIGHT}{more}</scene>")
+}
+
+#[test]
+fn integrators_that_do_the_same_are_read() {
+    let settings = |text: &str| load_with(&with_integrator(text, ""), &[], &[]).unwrap().integrator;
+    let deep = |max_depth, rr_depth| IntegratorSettings { max_depth, rr_depth };
+    let limits = "<integer name='max_depth' value='7'/><integer name='rr_depth' value='9'/>";
+    for (kind, default) in [
+        ("volpath", None),
+        ("volpathmis", None),
+        ("path", None),
+        ("prb", Some(6)),
+        ("prbvolpath", Some(6)),
+        ("prb_basic", Some(6)),
+    ] {
+        assert_eq!(settings(&format!("<integrator type='{kind}'/>")), deep(default, 5), "{kind}");
+        assert_eq!(settings(&format!("<integrator type='{kind}'>{limits}</integrator>")), deep(Some(7), 9), "{kind}");
+    }
+    assert_eq!(settings("<integrator type='direct'/>"), deep(Some(2), 5));
+    let samples = "<integer name='emitter_samples' value='4'/><integer name='bsdf_samples' value='0'/>";
+    assert_eq!(settings(&format!("<integrator type='direct'>{samples}</integrator>")), deep(Some(2), 5));
+    let bad = |text: &str, part: &str| refused_text(&with_integrator(text, ""), &[], "s.xml:1:24", part);
+    let none = samples.replace('4', "0");
+    bad(&format!("<integrator type='direct'>{none}</integrator>"), "no samples");
+    let fog = with_integrator("<integrator type='path'/>", FOG);
+    assert!(warned(&load_with(&fog, &[], &[]).unwrap(), "ignores media in Mitsuba"));
+    assert!(!warned(&load_with(&with_integrator("<integrator type='path'/>", ""), &[], &[]).unwrap(), "media"));
+}
+
+#[test]
+fn integrators_around_another_are_passed_over_with_a_warning() {
+    let inner = "<integrator type='path' name='img'><integer name='max_depth' value='3'/></integrator>";
+    for wrapper in ["moment'>", "stokes'>", "aov'><string name='aovs' value='d:depth'/>"] {
+        let loaded =
+            load_with(&with_integrator(&format!("<integrator type='{wrapper}{inner}</integrator>"), ""), &[], &[])
+                .unwrap();
+        assert_eq!(loaded.integrator.max_depth, Some(3));
+        assert!(warned(&loaded, "is passed over"));
+    }
+    let empty = with_integrator("<integrator type='moment'/>", "");
+    refused_text(&empty, &[], "s.xml:1:24", "must hold one integrator");
+    let circle = "<integrator type='moment' id='a'><integrator type='aov'><ref id='a'/></integrator></integrator>";
+    refused_text(&with_integrator(circle, ""), &[], "s.xml:1:80", "cycle");
+}
+
+#[test]
+fn films_and_filters_are_read() {
+    let film = |inner: &str| {
+        let text =
+            format!("{HEAD}<sensor type='perspective'><film type='hdrfilm'>{inner}</film></sensor>{LIGHT}</scene>");
+        load_with(&text, &[], &[]).unwrap()
+    };
+    for (filter, expected) in [
+        ("box'>", ReconstructionFilter::Box),
+        ("gaussian'>", ReconstructionFilter::Gaussian { stddev: 0.5 }),
+        ("tent'>", ReconstructionFilter::Tent { radius: 1.0 }),
+        ("tent'><float name='radius' value='2'/>", ReconstructionFilter::Tent { radius: 2.0 }),
+        ("mitchell'>", ReconstructionFilter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 }),
+        (
+            "mitchell'><float name='B' value='0'/><float name='C' value='.5'/>",
+            ReconstructionFilter::Mitchell { b: 0.0, c: 0.5 },
+        ),
+        ("catmullrom'>", ReconstructionFilter::CatmullRom),
+        ("lanczos'>", ReconstructionFilter::Lanczos { lobes: 3 }),
+        ("lanczos'><integer name='lobes' value='2'/>", ReconstructionFilter::Lanczos { lobes: 2 }),
+    ] {
+        assert_eq!(film(&format!("<rfilter type='{filter}</rfilter>")).film.filter, expected, "{filter}");
+    }
+    let format =
+        |value: &str| film(&format!("<string name='component_format' value='{value}'/>")).film.component_format;
+    assert_eq!(film("").film.component_format, ComponentFormat::Float16);
+    assert_eq!(format("float16"), ComponentFormat::Float16);
+    assert_eq!(format("Float32"), ComponentFormat::Float32);
+    assert!(warned(&film("<string name='pixel_format' value='rgba'/>"), "written as rgb, not as rgba"));
+    assert!(warned(&film("<string name='file_format' value='pfm'/>"), "written as OpenEXR, not as pfm"));
+    assert!(
+        film("<string name='file_format' value='exr'/><boolean name='sample_border' value='true'/>")
+            .warnings
+            .is_empty()
+    );
+    let spectral = format!("{HEAD}<sensor type='perspective'><film type='specfilm'/></sensor></scene>");
+    refused_text(&spectral, &[], "s.xml:3:28", "specfilm");
+}
+
+#[test]
+fn spectra_that_are_constant_are_read() {
+    let text = "<spectrum name='NAME' value='0.5'/>";
+    let named = |name: &str| text.replace("NAME", name);
+    let loaded = load(&format!(
+        "<shape type='cube'><bsdf type='diffuse'>{}</bsdf></shape><emitter type='constant'>{}</emitter>\
+         <medium type='homogeneous'><spectrum name='sigma_t' value='3'/>{}</medium>",
+        named("reflectance"),
+        named("radiance"),
+        named("albedo")
+    ));
+    assert_eq!(loaded.surfaces[0].bsdf.front, Vec3::splat(0.5));
+    assert_eq!((loaded.media[0].sigma_t, loaded.media[0].albedo), (3.0, Vec3::splat(0.5)));
+    // Equal energy is not white: seen in Mitsuba 3.9.1.
+    let Emitter::Constant { radiance } = loaded.emitters[0] else { panic!("not constant") };
+    assert!((radiance - Vec3::new(0.602_397, 0.474_146, 0.454_458)).abs().max_element() < 1e-6, "{radiance}");
+    refused(
+        "<bsdf type='diffuse'><spectrum name='reflectance' value='400:.1, 700:.2'/></bsdf>",
+        "3:22",
+        "over wavelengths",
+    );
+    refused("<bsdf type='diffuse'><spectrum name='reflectance' value='.1 .1 .1'/></bsdf>", "3:22", "over wavelengths");
+    refused("<bsdf type='diffuse'><spectrum name='reflectance' value='1.5'/></bsdf>", "3:22", "[0, 1]");
+}
+
+#[test]
+fn rotations_are_those_of_mitsuba() {
+    let moved = |op: &str| {
+        let text = format!(
+            "<emitter type='point'><transform name='to_world'><translate x='1' y='2' z='3'/>{op}</transform></emitter>"
+        );
+        let loaded = load(&text);
+        let Emitter::Point { position, .. } = loaded.emitters[0] else { panic!("not a point") };
+        (position, warned(&loaded, "rotation axis has length"))
+    };
+    let near = |(position, warning): (DVec3, bool), expected: DVec3, warns: bool| {
+        assert!((position - expected).length() < 1e-9 && warning == warns, "{position} {warning}");
+    };
+    near(moved("<rotate value='0, 0, 1' angle='90'/>"), DVec3::new(-2.0, 1.0, 3.0), false);
+    near(moved("<rotate z='0.9995' angle='90'/>"), DVec3::new(-2.0, 1.0, 3.0), false);
+    // cos I + (1 − cos) a aᵀ + sin [a]×, with a as it is.
+    near(moved("<rotate z='2' angle='90'/>"), DVec3::new(-4.0, 2.0, 12.0), true);
+    near(moved("<rotate value='1' angle='180'/>"), DVec3::new(11.0, 10.0, 9.0), true);
+}
+
+#[test]
+fn camera_matrices_with_few_digits_become_rotations() {
+    let camera = |matrix: &str| {
+        let sensor = format!("<transform name='to_world'><matrix value='{matrix}'/></transform>");
+        load_with(&with_sensor("", &sensor), &[], &[])
+    };
+    let digits = |digits: usize, turn: DMat3| {
+        let rows = turn.transpose().to_cols_array();
+        let row = |i: usize| rows[3 * i..3 * i + 3].iter().map(|v| format!("{v:.digits$} ")).collect::<String>();
+        camera(&format!("{}7 {}8 {}9 0 0 0 1", row(0), row(1), row(2)))
+    };
+    for i in 1..60 {
+        let turn =
+            DMat3::from_axis_angle(DVec3::new(f64::from(i).sin(), f64::from(i).cos(), 0.3).normalize(), f64::from(i));
+        for count in [3, 4] {
+            let loaded = digits(count, turn).unwrap();
+            let m = loaded.sensor.world_from_camera;
+            let linear = DMat3::from_mat4(m);
+            assert!((linear.transpose() * linear).abs_diff_eq(DMat3::IDENTITY, 1e-14));
+            assert!(linear.abs_diff_eq(turn, 2e-3) && linear.determinant() > 0.0);
+            assert_eq!(m.w_axis.truncate(), DVec3::new(7.0, 8.0, 9.0));
+            assert!(warned(&loaded, "orthonormal"));
+        }
+        assert!(digits(9, turn).unwrap().warnings.is_empty());
+    }
+    let mirrored = camera("-0.9995 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1").unwrap();
+    let mirroring = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    assert!(DMat3::from_mat4(mirrored.sensor.world_from_camera).abs_diff_eq(mirroring, 1e-14));
+    for scaled in ["1.002 0 0 0 1.002 0 0 0 1.002", "1 0 0.01 0 1 0 0 0 1", "2 0 0 0 2 0 0 0 2", "1 0 0 0 1 0 0 0 0.99"]
+    {
+        assert!(camera(scaled).unwrap_err().to_string().contains("scales"), "{scaled}");
+    }
+}
+
+#[test]
+fn one_of_several_sensors_is_chosen() {
+    let sensor = |fov: u32| format!("<sensor type='perspective'><float name='fov' value='{fov}'/>{FILM}</sensor>");
+    let text = format!("{HEAD}{}{}{LIGHT}</scene>", sensor(90), sensor(60));
+    let chosen = |sensor| {
+        let source = SceneSource::embedded(file("s.xml", &text), vec![]);
+        Scene::from_source(&source, &LoadOptions { sensor, ..LoadOptions::default() })
+    };
+    let first = chosen(None).unwrap();
+    assert!((first.sensor.tan_half_fov_x - 1.0).abs() < 1e-12 && warned(&first, "the scene has 2 sensors: the first"));
+    assert!(chosen(Some(0)).unwrap().warnings.is_empty());
+    assert!((chosen(Some(1)).unwrap().sensor.tan_half_fov_x - 30_f64.to_radians().tan()).abs() < 1e-12);
+    let message = chosen(Some(2)).unwrap_err().to_string();
+    assert!(message.contains("no sensor 2") && message.contains("it has 2"), "{message}");
+}
+
+#[test]
+fn properties_of_the_sensor_without_effect_are_warned_about() {
+    let loaded = load_with(
+        &with_sensor("", "<float name='focus_distance' value='3'/><float name='shutter_close' value='1'/>"),
+        &[],
+        &[],
+    );
+    let loaded = loaded.unwrap();
+    assert!(warned(&loaded, "\"focus_distance\"") && warned(&loaded, "\"shutter_close\""));
+    refused_text(&with_sensor("", "<string name='fov_axis' value='x'/>"), &[], "s.xml:4:50", "without \"fov\"");
+    let lens = "<string name='fov_axis' value='x'/><string name='focal_length' value='50mm'/>";
+    refused_text(&with_sensor("", lens), &[], "s.xml:4:50", "without \"fov\"");
+}
+
+#[test]
+fn area_lights_may_be_referred_to() {
+    let light = "<emitter type='area' id='l'><rgb name='radiance' value='2'/></emitter>";
+    let shape = "<shape type='cube'><ref id='l'/></shape>";
+    let loaded = load(&format!("{light}{shape}"));
+    assert_eq!(loaded.surfaces[0].radiance, Some(Vec3::splat(2.0)));
+    assert_eq!(loaded.emitters[0], Emitter::Area { surface: 0 });
+    assert!(loaded.warnings.is_empty());
+    assert!(warned(&load(&format!("{light}{shape}{shape}")), "several shapes share this emitter"));
+    assert!(warned(&load(light), "no shape refers to this area emitter"));
+    refused("<emitter type='area'/>", "3:1", "no shape");
+    refused("<emitter type='area' id='l'><float name='radiance' value='-1'/></emitter>", "3:29", "at least 0");
+}
+
+/// Mitsuba 3.9.1 gives the same mean, 0.0481, with a null BSDF and without a BSDF for a lamp above a floor.
+#[test]
+fn an_area_light_with_a_null_bsdf_is_a_black_one() {
+    let loaded = load("<shape type='rectangle'><bsdf type='null'/><emitter type='area'/></shape>");
+    assert_eq!((loaded.surfaces[0].bsdf.front, loaded.surfaces[0].bsdf.back), (Vec3::ZERO, Vec3::ZERO));
+    assert_eq!(loaded.emitters[0], Emitter::Area { surface: 0 });
+    assert!(warned(&loaded, "opaque and black") && loaded.boundaries.is_empty());
+}
