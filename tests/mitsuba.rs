@@ -153,7 +153,8 @@ fn load(name: &str, depth: i32) -> Scene {
         return builtin(name, &defines);
     }
     let defines = defines.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
-    Scene::load(&folder().join(format!("scenes/{name}.xml")), &LoadOptions { defines }).expect("the scene loads")
+    Scene::load(&folder().join(format!("scenes/{name}.xml")), &LoadOptions { defines, ..LoadOptions::default() })
+        .expect("the scene loads")
 }
 
 fn ours(name: &str, depth: i32, transmittance: TransmittanceEstimator) -> Blocks {

@@ -15,7 +15,7 @@ use common::{
 use glam::{DVec3, Vec3, dvec3, vec3};
 use vdf::{
     geometry::{Segment, Triangle},
-    render::{FreeFlight, Lights, Media, PhaseFunction as _, Sampler, sample_filter},
+    render::{FreeFlight, Lights, Media, PhaseFunction as _, PixelFilter, Sampler},
     scene::{Bsdf, Emitter, Phase, ReconstructionFilter, Rgb, Scene, Surface},
 };
 
@@ -345,6 +345,7 @@ fn filters_are_drawn_with_their_density() {
         ReconstructionFilter::Box,
         ReconstructionFilter::Gaussian { stddev: 0.5 },
         ReconstructionFilter::Gaussian { stddev: 3.0 },
+        ReconstructionFilter::Tent { radius: 1.5 },
     ] {
         let (low, high, density): (f64, f64, Box<dyn Fn(f64) -> f64>) = match filter {
             ReconstructionFilter::Box => (0.0, 1.0, Box::new(|_| 1.0)),
@@ -353,7 +354,13 @@ fn filters_are_drawn_with_their_density() {
                     move |x: f64| ((-(x - 0.5).powi(2) / (2.0 * stddev * stddev)).exp() - (-8.0_f64).exp()).max(0.0);
                 (0.5 - 4.0 * stddev, 0.5 + 4.0 * stddev, Box::new(f))
             }
+            ReconstructionFilter::Tent { radius } => {
+                let f = move |x: f64| (1.0 - (x - 0.5).abs() / radius).max(0.0);
+                (0.5 - radius, 0.5 + radius, Box::new(f))
+            }
+            _ => unreachable!("their weights have a test of their own"),
         };
+        let prepared = PixelFilter::new(&filter);
         let width = (high - low) / CELLS as f64;
         let cells: Vec<_> =
             (0..CELLS).map(|i| integrate(&density, low + width * i as f64, low + width * (i + 1) as f64)).collect();
@@ -362,7 +369,7 @@ fn filters_are_drawn_with_their_density() {
             cells.iter().flat_map(|y| cells.iter().map(move |x| x * y / total / total)).collect();
         let mut counts = vec![0; probabilities.len()];
         for i in 0..200_000 {
-            let [x, y] = sample_filter(&filter, &mut Sampler::new(51, i, 0, 0)).map(|x| (x - low) / width);
+            let [x, y] = prepared.sample(&mut Sampler::new(51, i, 0, 0)).offset.map(|x| (x - low) / width);
             assert!((0.0..=CELLS as f64).contains(&x) && (0.0..=CELLS as f64).contains(&y), "{filter:?}: outside");
             counts[(y as usize).min(CELLS - 1) * CELLS + (x as usize).min(CELLS - 1)] += 1;
         }
@@ -370,7 +377,7 @@ fn filters_are_drawn_with_their_density() {
         // By one coordinate, with more samples: what the tails lack is seen only so.
         let mut counts = vec![0; CELLS];
         for i in 0..1_000_000 {
-            for x in sample_filter(&filter, &mut Sampler::new(52, i, 0, 0)) {
+            for x in prepared.sample(&mut Sampler::new(52, i, 0, 0)).offset {
                 counts[(((x - low) / width) as usize).min(CELLS - 1)] += 1;
             }
         }

@@ -21,7 +21,7 @@ fn the_grids_are_those_of_the_thesis() {
         let Bounds { min, max } = World::new(&scene).bounds;
         for (voxel_size, expected) in [0.25, 0.5, 1.0].into_iter().zip(resolutions) {
             let r = VoxelGrid::covering(min, max, voxel_size, 1 << 30).unwrap().resolution();
-            assert_eq!([r.x, r.y, r.z], expected, "{name}, voxel {voxel_size}");
+            assert_eq!(r.sides(), expected, "{name}, voxel {voxel_size}");
         }
     }
 }

@@ -13,10 +13,7 @@ const NAMES: [&str; 7] = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "c
 
 macro_rules! scene_file {
     ($path:literal) => {
-        EmbeddedFile {
-            path: Cow::Borrowed($path),
-            text: Cow::Borrowed(include_str!(concat!("../", $path))),
-        }
+        EmbeddedFile { path: Cow::Borrowed($path), text: Cow::Borrowed(include_str!(concat!("../", $path))) }
     };
 }
 

@@ -9,8 +9,8 @@ use vdf::{
         Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, TransmittanceEstimator,
     },
     scene::{
-        Boundary, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
-        ReconstructionFilter, Rgb, Scene,
+        Boundary, ComponentFormat, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, PerspectiveSensor,
+        Phase, PixelRect, ReconstructionFilter, Rgb, Scene,
     },
     visibility::Method,
 };
@@ -85,6 +85,7 @@ pub fn empty_scene(size: u32, spp: u32, tan_half_fov: f64) -> Scene {
             height: size,
             crop: PixelRect { x0: 0, y0: 0, x1: size, y1: size },
             filter: ReconstructionFilter::Box,
+            component_format: ComponentFormat::Float32,
         },
         integrator: IntegratorSettings { max_depth: None, rr_depth: 5 },
         sample_count: spp,

@@ -174,8 +174,6 @@ fn case_39_collisions_stay_in_their_medium() {
         let mut u = Sampler::new(72, i, 0, 0);
         let mut point = || dvec3(u.next_1d(), u.next_1d(), u.next_1d()) * 10.0 - 1.0;
         let s = Segment::new(point(), point());
-        let inside = |p: DVec3| p.cmpge(DVec3::splat(1.0)).all() && p.cmple(DVec3::splat(7.0)).all();
-        let start = inside(s.p).then_some(MediumId(0));
         let tau = media.optical_depth(&s, &media.regions_at(s.p));
         // The last depths before the end of the fog, or any.
         let wanted = if i % 2 == 0 { tau.next_down() } else { tau * u.next_1d() };

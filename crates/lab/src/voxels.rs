@@ -60,7 +60,7 @@ impl SceneVoxels {
 fn neighbourhood(grid: &VoxelGrid, provers: &Provers, emitter: usize, position: DVec3) -> VoxelSet {
     let half = DVec3::splat(0.5 * grid.voxel_size());
     VoxelSet::from_rows(grid.resolution(), |j, k, row| {
-        for i in 0..grid.resolution().x {
+        for i in 0..grid.resolution().x() {
             let middle = grid.corner(Voxel::new(i, j, k)) + half;
             let query = ShadowQuery { from: middle, to: position, emitter, kind: QueryKind::Spatial };
             if provers.answer(&query) == Answer::Unoccluded {

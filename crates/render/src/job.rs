@@ -2,11 +2,11 @@
 //!
 //! Every random number is a function of (seed, pixel, sample, dimension), so a path is the same whoever follows it, and in whatever order.
 
-use vdf_scene::{PixelRect, ReconstructionFilter, Rgb};
+use vdf_scene::{PixelRect, Rgb};
 use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
 use crate::{
-    Camera, Integrator, PreparedScene, Progress, RenderOptions, Sampler, filter::sample_filter, integrator::Tracer,
+    Camera, FilterSample, Integrator, PixelFilter, PreparedScene, Progress, RenderOptions, Sampler, integrator::Tracer,
 };
 
 /// Side of a tile in pixels. Only progress sees tiles.
@@ -27,7 +27,7 @@ pub struct Job<'a> {
 pub struct PathTracer<'a, R> {
     tracer: Tracer<'a, R>,
     camera: Camera,
-    filter: ReconstructionFilter,
+    filter: PixelFilter,
     integrator: Integrator,
     seed: u64,
 }
@@ -116,7 +116,7 @@ impl<'a> Job<'a> {
                 progress,
             },
             camera: self.camera,
-            filter: scene.film.filter,
+            filter: PixelFilter::new(&scene.film.filter),
             integrator: self.options.integrator,
             seed: self.seed,
         }
@@ -133,14 +133,14 @@ impl<R> std::fmt::Debug for PathTracer<'_, R> {
 }
 
 impl<R: Recorder> PathTracer<'_, R> {
-    /// The radiance of one path: sample number `sample` of pixel (`x`, `y`) of the full film.
+    /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.
     #[inline]
-    pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> Rgb {
+    pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> (Rgb, f64) {
         let mut sampler = Sampler::new(self.seed, x, y, sample);
-        let [dx, dy] = sample_filter(&self.filter, &mut sampler);
+        let FilterSample { offset: [dx, dy], weight } = self.filter.sample(&mut sampler);
         let world = self.tracer.world;
         let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
         let ray = self.tracer.camera_ray(self.camera.position(), segment, direction);
-        self.tracer.radiance(self.integrator, ray, &mut sampler, counters)
+        (self.tracer.radiance(self.integrator, ray, &mut sampler, counters), weight)
     }
 }

@@ -49,7 +49,7 @@ mod world;
 pub use camera::Camera;
 pub use error::RenderError;
 pub use film::{Film, FilmError, FilmOrigin};
-pub use filter::sample_filter;
+pub use filter::{FilterSample, PixelFilter};
 pub use integrator::{Integrator, UnknownIntegrator};
 pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};

@@ -73,7 +73,7 @@ impl PreparedScene {
         let bounds = *world.grid_bounds(options.grid);
         let method = options.method.unwrap_or_else(|| Method::for_lights(&lights));
         let voxel_size = options.voxel_size.unwrap_or_else(|| default_voxel_size(&bounds));
-        let options = ProverOptions { method, voxel_size, max_voxels: options.max_voxels };
+        let options = ProverOptions { method, voxel_size, max_voxels: options.max_voxels, ..ProverOptions::default() };
         let (provers, build) = Provers::build(&options, &world.triangles, bounds, &lights)?;
         drop(lights);
         Ok(Self { scene, world, t_hierarchy, method, provers, build })

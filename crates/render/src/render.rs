@@ -135,10 +135,10 @@ fn sum_pixel(
         if sample % SAMPLES_PER_LOOK == 0 && progress.cancelled() {
             return Err(RenderError::Cancelled);
         }
-        let radiance = tracer.sample(x, y, sample, counters);
+        let (radiance, weight) = tracer.sample(x, y, sample, counters);
         counters.paths += 1;
         if radiance.is_finite() && radiance.min_element() >= 0.0 {
-            sum.add(sample, radiance.as_dvec3());
+            sum.add(sample, radiance.as_dvec3() * weight);
         } else {
             counters.refused += 1;
             sum.add(sample, glam::DVec3::ZERO);

@@ -36,7 +36,7 @@ impl Fixture {
     fn new(triangles: Vec<Triangle>, lights: &[DVec3], (min, max): (DVec3, DVec3), sizes: &[f64]) -> Self {
         let shapes: Vec<_> = lights.iter().map(|&position| LightShape::Point(position)).collect();
         let build = |method, voxel_size| {
-            let options = ProverOptions { method, voxel_size, max_voxels: 1 << 24 };
+            let options = ProverOptions { method, voxel_size, max_voxels: 1 << 24, ..ProverOptions::default() };
             Provers::build(&options, &triangles, Bounds::new(min, max), &shapes).expect("a sound grid").0
         };
         let provers =

@@ -109,7 +109,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
 
 /// The scene and its name: a file if there is one of that path, else a built-in scene. A folder is no scene, so it hides none.
 pub(super) fn load(scene: Option<&Path>, defines: &[(String, String)]) -> Result<(String, Scene), Failure> {
-    let options = LoadOptions { defines: defines.to_vec() };
+    let options = LoadOptions { defines: defines.to_vec(), ..LoadOptions::default() };
     let path = scene.unwrap_or(Path::new(DEFAULT_SCENE));
     if scene.is_none() || !path.exists() || path.is_dir() {
         if let Some(source) = path.to_str().and_then(builtin) {

@@ -71,7 +71,7 @@ fn summarize(args: &VoxelizeArgs, voxels: &SceneVoxels, written: &[PathBuf]) -> 
     let (r, o) = (voxels.grid.resolution(), voxels.grid.origin());
     let (all, occupied) = (r.voxel_count(), voxels.occupied.count());
     let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
-    writeln!(out, "grid           {} x {} x {} voxels of {}", r.x, r.y, r.z, voxels.grid.voxel_size())?;
+    writeln!(out, "grid           {} x {} x {} voxels of {}", r.x(), r.y(), r.z(), voxels.grid.voxel_size())?;
     writeln!(out, "origin         {} {} {}", o.x, o.y, o.z)?;
     writeln!(out, "occupied       {occupied} of {all}, {:.2} % free", percent(all - occupied, all))?;
     for (i, neighbourhood) in voxels.neighbourhoods.iter().enumerate() {

@@ -12,7 +12,7 @@ use crate::LabError;
 
 fn scene(name: &str, size: &str) -> Scene {
     let defines = [("width", size), ("height", size)].map(|(n, v)| (n.to_owned(), v.to_owned())).to_vec();
-    Scene::from_source(&builtin(name).unwrap(), &LoadOptions { defines }).unwrap()
+    Scene::from_source(&builtin(name).unwrap(), &LoadOptions { defines, ..LoadOptions::default() }).unwrap()
 }
 
 fn prepared(scene: Scene, method: Method) -> PreparedScene {

@@ -162,7 +162,7 @@ fn verify_in_pool(
         }
         let r = grid.resolution();
         let free_share = 1.0 - occupied.count() as f64 / r.voxel_count() as f64;
-        grids.push(GridSummary { voxel_size, grid: [r.x, r.y, r.z], free_share, excess });
+        grids.push(GridSummary { voxel_size, grid: r.sides(), free_share, excess });
 
         progress.phase("verifying");
         let start = Instant::now();

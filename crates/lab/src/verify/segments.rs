@@ -360,7 +360,8 @@ impl<'a> Generator<'a> {
         if draw.chance(0.4) {
             let axis = draw.pick(3);
             let r = self.grid.resolution();
-            let end = self.grid.origin() + DVec3::new(r.x.into(), r.y.into(), r.z.into()) * self.grid.voxel_size();
+            let end =
+                self.grid.origin() + DVec3::new(r.x().into(), r.y().into(), r.z().into()) * self.grid.voxel_size();
             p[axis] = draw.of(&[min[axis], max[axis], end[axis]]);
             return nudged(draw, p);
         }

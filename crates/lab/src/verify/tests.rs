@@ -4,7 +4,8 @@ use glam::{DMat4, DVec3, Vec3};
 use vdf_geometry::{Segment, Triangle};
 use vdf_render::World;
 use vdf_scene::{
-    Bsdf, Emitter, FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect, ReconstructionFilter, Rgb, Surface,
+    Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect,
+    ReconstructionFilter, Rgb, Surface,
 };
 use vdf_visibility::VisibilityError;
 
@@ -38,6 +39,7 @@ fn scene() -> Scene {
             height: 1,
             crop: PixelRect { x0: 0, y0: 0, x1: 1, y1: 1 },
             filter: ReconstructionFilter::Box,
+            component_format: ComponentFormat::Float32,
         },
         integrator: IntegratorSettings { max_depth: None, rr_depth: 5 },
         sample_count: 1,

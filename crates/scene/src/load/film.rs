@@ -35,7 +35,7 @@ pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Film
     if pixel_format != "rgb" {
         loader.warn(object.place_of("pixel_format"), &format!("the image is written as rgb, not as {pixel_format}"));
     }
-    let component_format = match object.choice("component_format", "float16", &["float16", "float32"])? {
+    let component_format = match object.choice("component_format", "float32", &["float16", "float32"])? {
         "float32" => ComponentFormat::Float32,
         _ => ComponentFormat::Float16,
     };

@@ -82,7 +82,7 @@ fn films_and_filters_are_read() {
     }
     let format =
         |value: &str| film(&format!("<string name='component_format' value='{value}'/>")).film.component_format;
-    assert_eq!(film("").film.component_format, ComponentFormat::Float16);
+    assert_eq!(film("").film.component_format, ComponentFormat::Float32);
     assert_eq!(format("float16"), ComponentFormat::Float16);
     assert_eq!(format("Float32"), ComponentFormat::Float32);
     assert!(warned(&film("<string name='pixel_format' value='rgba'/>"), "written as rgb, not as rgba"));

@@ -172,7 +172,7 @@ mod tests {
 
     fn scene(defines: &[(&str, &str)]) -> Scene {
         let defines = defines.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
-        Scene::from_source(&builtin("cbox_vol2").unwrap(), &LoadOptions { defines }).unwrap()
+        Scene::from_source(&builtin("cbox_vol2").unwrap(), &LoadOptions { defines, ..LoadOptions::default() }).unwrap()
     }
 
     fn why(lookup: Lookup) -> String {

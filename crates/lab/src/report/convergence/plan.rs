@@ -162,7 +162,7 @@ pub(super) fn resized(film: FilmSettings, width: u32) -> FilmSettings {
 
 #[cfg(test)]
 mod tests {
-    use vdf_scene::ReconstructionFilter;
+    use vdf_scene::{ComponentFormat, ReconstructionFilter};
 
     use super::*;
 
@@ -189,8 +189,13 @@ mod tests {
     #[test]
     fn films_keep_their_proportions() {
         let rect = |[x0, y0, x1, y1]: [u32; 4]| PixelRect { x0, y0, x1, y1 };
-        let film =
-            |width, height, crop| FilmSettings { width, height, crop: rect(crop), filter: ReconstructionFilter::Box };
+        let film = |width, height, crop| FilmSettings {
+            width,
+            height,
+            crop: rect(crop),
+            filter: ReconstructionFilter::Box,
+            component_format: ComponentFormat::Float32,
+        };
         for (from, width, to) in [
             (film(512, 512, [0, 0, 512, 512]), 48, film(48, 48, [0, 0, 48, 48])),
             (film(640, 480, [0, 0, 640, 480]), 64, film(64, 48, [0, 0, 64, 48])),

@@ -54,7 +54,10 @@ impl Lab<'_> {
     pub(super) fn load(&self, source: &SceneSource) -> Result<Scene, LabError> {
         look(self.progress)?;
         let define = |name: &str| (name.to_owned(), self.options.size.to_string());
-        Ok(Scene::from_source(source, &LoadOptions { defines: vec![define("width"), define("height")] })?)
+        Ok(Scene::from_source(
+            source,
+            &LoadOptions { defines: vec![define("width"), define("height")], ..LoadOptions::default() },
+        )?)
     }
 
     pub(super) fn builtin(&self, name: &str) -> Result<Scene, LabError> {

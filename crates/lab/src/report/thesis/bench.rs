@@ -55,7 +55,10 @@ impl Bench<'_> {
         self.step(name, "loading");
         let source = builtin(name).ok_or_else(|| LabError::UnknownScene(name.to_owned()))?;
         let define = |name: &str| (name.to_owned(), self.side.to_string());
-        let scene = Scene::from_source(&source, &LoadOptions { defines: vec![define("width"), define("height")] })?;
+        let scene = Scene::from_source(
+            &source,
+            &LoadOptions { defines: vec![define("width"), define("height")], ..LoadOptions::default() },
+        )?;
         Ok(PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Part(self.progress))?)
     }
 
