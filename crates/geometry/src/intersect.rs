@@ -18,38 +18,7 @@
 
 use glam::DVec3;
 
-use crate::Triangle;
-
-/// A closed segment from `p` to `q`, in world units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
-    /// Start, at t = 0.
-    pub p: DVec3,
-    /// End, at t = 1.
-    pub q: DVec3,
-}
-
-impl Segment {
-    /// The segment from `p` to `q`.
-    #[must_use]
-    pub const fn new(p: DVec3, q: DVec3) -> Self {
-        Self { p, q }
-    }
-
-    /// The point at parameter `t` in [0, 1].
-    #[inline]
-    #[must_use]
-    pub fn at(&self, t: f64) -> DVec3 {
-        self.p + (self.q - self.p) * t
-    }
-
-    /// Its length in world units.
-    #[inline]
-    #[must_use]
-    pub fn length(&self) -> f64 {
-        (self.q - self.p).length()
-    }
-}
+use crate::{Segment, Triangle};
 
 /// Where a segment meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,8 +37,8 @@ pub struct SegmentTest {
     direction: DVec3,
     /// That component's size, in world units.
     length: f64,
-    /// The axis of the largest component is the last. Those before it are in cyclic order, which keeps the orientation, or exchanged if the segment points
-    /// backwards along the last, which would mirror.
+    /// The axis of the largest component is the last. Those before it are in cyclic order, which keeps the orientation,
+    /// or exchanged if the segment points backwards along the last, which would mirror.
     axes: [usize; 3],
     /// By how much the first two coordinates change with the last.
     shear: [f64; 2],
@@ -87,11 +56,11 @@ const U: f64 = f64::EPSILON / 2.0;
 impl SegmentTest {
     /// Prepares `segment` for triangles within the box from `min` to `max`.
     ///
-    /// With `u` = 2⁻⁵³ and `m` the largest coordinate difference of a vertex and `segment.p`, a sheared coordinate is at most 2m
-    /// and is computed with an error of at most 8um (one subtraction, a shear factor of 3 roundings, a product, a
-    /// subtraction). An edge function is the difference of two products of these: error at most
-    /// 2·(2·8um·2m + u·4m²) + u·8m² = 80um². `T` sums three products of an edge function (at most 8m²) and a depth
-    /// (at most m/|d_z|, 3 roundings): error at most 3·(80 + 4·8)um³/|d_z| + 3·u·24m³/|d_z| = 408um³/|d_z|; det, three edge
+    /// With `u` = 2⁻⁵³ and `m` the largest coordinate difference of a vertex and `segment.p`, a sheared coordinate is
+    /// at most 2m and is computed with an error of at most 8um (one subtraction, a shear factor of 3 roundings, a
+    /// product, a subtraction). An edge function is the difference of two products of these: error at most 2·(2·8um·2m
+    /// + u·4m²) + u·8m² = 80um². `T` sums three products of an edge function (at most 8m²) and a depth (at most
+    /// m/|d_z|, 3 roundings): error at most 3·(80 + 4·8)um³/|d_z| + 3·u·24m³/|d_z| = 408um³/|d_z|; det, three edge
     /// functions, errs by at most 240um² + 2u·24m². The constants below are rounded up to powers of two.
     #[inline]
     #[must_use]
@@ -172,7 +141,8 @@ impl SegmentTest {
         self.intersect_coordinates(self.axes.map(|axis| [a[axis], b[axis], c[axis]]), || *triangle)
     }
 
-    /// The same from the vertices' coordinates along each of [`SegmentTest::axes`]; the triangle is asked for where the call is close.
+    /// The same from the vertices' coordinates along each of [`SegmentTest::axes`]; the triangle is asked for where the
+    /// call is close.
     #[inline(always)]
     pub(crate) fn intersect_coordinates(
         &self,
@@ -253,9 +223,9 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
     Some(TriangleHit { t, barycentric: [weight_a / sum, weight_b / sum, weight_c / sum] })
 }
 
-/// Where the segment crosses the triangle's plane. The predicates are certain of their sign, but their size may be nothing but rounding where an end
-/// is far away; here the segment's vector takes the place of the far end. `None` if the plane of so thin a triangle is not known to a
-/// thousandth, at this angle.
+/// Where the segment crosses the triangle's plane. The predicates are certain of their sign, but their size may be
+/// nothing but rounding where an end is far away; here the segment's vector takes the place of the far end. `None` if
+/// the plane of so thin a triangle is not known to a thousandth, at this angle.
 fn plane_parameter(segment: &Segment, triangle: &Triangle) -> Option<f64> {
     let [a, b, c] = triangle.vertices_f64();
     let d = segment.q - segment.p;

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 
 use crate::{Bounds, Bvh, Segment, SegmentTest, Triangle, intersect_exact};
 
-/// Coordinates where tests go wrong: a coarse lattice (shared planes, edges, corners), its neighbours in single precision, −0.0.
+/// Coordinates where tests go wrong: a coarse lattice (shared planes, edges, corners), its neighbours in single
+/// precision, −0.0.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => (-4_i8..=4).prop_map(f32::from),
@@ -114,8 +115,8 @@ proptest! {
     }
 }
 
-/// A closed sphere with displaced vertices: every segment from inside to outside meets it, also through vertices and along edges
-/// (after pbrt's `Triangle.Watertight`).
+/// A closed sphere with displaced vertices: every segment from inside to outside meets it, also through vertices and
+/// along edges (after pbrt's `Triangle.Watertight`).
 #[test]
 fn closed_meshes_are_watertight() {
     let n = 16_u16;
@@ -175,7 +176,8 @@ fn hierarchy_finds_hits_far_from_the_origin() {
     }
 }
 
-/// Segments with one end or both up to 10¹⁵ times as far away as the scene is large, against a loop over all triangles; in either direction.
+/// Segments with one end or both up to 10¹⁵ times as far away as the scene is large, against a loop over all triangles;
+/// in either direction.
 #[test]
 fn far_ends_miss_nothing() {
     let mut noise = fastrand::Rng::with_seed(5);
@@ -231,7 +233,8 @@ fn many_coincident_triangles_are_one() {
     }
 }
 
-/// Of nested boxes only the two smallest are joined at a time: the binary tree is as deep as it has triangles. The stack need not be: 26 bytes a level.
+/// Of nested boxes only the two smallest are joined at a time: the binary tree is as deep as it has triangles. The
+/// stack need not be: 26 bytes a level.
 #[test]
 fn nested_triangles_need_no_deep_stack() {
     const COUNT: u16 = 5000;
