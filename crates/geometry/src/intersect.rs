@@ -7,7 +7,7 @@
 //! Guarantee: whether a segment meets a triangle is answered *exactly* for the single-precision vertices of the
 //! triangle and the double-precision end points of the segment. So the reach of the intersector's errors, which the
 //! voxelization has to cover, is zero; the test is watertight; and it gives the same answer for a reversed segment.
-//! Only the position of a hit is rounded.
+//! Only the position of a hit is rounded, and it stays in the box of the triangle, up to a millionth of the scene.
 //!
 //! *Deviation:* \[Woop2013\] computes in single precision and repeats an edge function in double precision if it is
 //! zero. That leaves an error of some ulps of the largest sheared coordinate in the decision, and an unbounded one
@@ -18,12 +18,13 @@
 
 use glam::DVec3;
 
-use crate::{Segment, Triangle};
+use crate::{Bounds, Segment, Triangle};
 
 /// Where a segment meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleHit {
-    /// Parameter along the segment, in [0, 1]; rounded.
+    /// Parameter along the segment, in [0, 1]; rounded, but its place is within the box of the triangle
+    /// ([`SegmentTest::intersect`]).
     pub t: f64,
     /// Barycentric weights of the vertices; each in [0, 1], their sum is 1 up to rounding.
     pub barycentric: [f64; 3],
@@ -48,6 +49,8 @@ pub struct SegmentTest {
     edge_error: f64,
     /// Largest error of `T` and of `T − det`, see [`SegmentTest::intersect`].
     t_error: f64,
+    /// How far outside the box of a triangle the place of a hit may be, in world units.
+    slack: f64,
 }
 
 /// Half an ulp of 1 in double precision.
@@ -57,14 +60,22 @@ impl SegmentTest {
     /// Prepares `segment` for triangles within the box from `min` to `max`.
     ///
     /// With `u` = 2⁻⁵³ and `m` the largest coordinate difference of a vertex and `segment.p`, a sheared coordinate is
-    /// at most 2m and is computed with an error of at most 8um (one subtraction, a shear factor of 3 roundings, a
-    /// product, a subtraction). An edge function is the difference of two products of these: error at most 2·(2·8um·2m
-    /// + u·4m²) + u·8m² = 80um². `T` sums three products of an edge function (at most 8m²) and a depth (at most
-    /// m/|d_z|, 3 roundings): error at most 3·(80 + 4·8)um³/|d_z| + 3·u·24m³/|d_z| = 408um³/|d_z|; det, three edge
-    /// functions, errs by at most 240um² + 2u·24m². The constants below are rounded up to powers of two.
+    /// at most 2m and is computed with an error of at most 8um: one subtraction, a shear factor of 3 roundings, a
+    /// product, a subtraction. An edge function is the difference of two products of these. So its error is at most
+    /// 2·(2·8um·2m + u·4m²) + u·8m² = 80um². `T` sums three products of an edge function (at most 8m²) and a depth
+    /// (at most m/|d_z|, 3 roundings). Its error is at most 3·(80 + 4·8)um³/|d_z| + 3·u·24m³/|d_z| = 408um³/|d_z|. That
+    /// of det, three edge functions, is at most 240um² + 2u·24m². The constants below are rounded up to powers of two.
     #[inline]
     #[must_use]
     pub fn new(segment: Segment, min: DVec3, max: DVec3) -> Self {
+        let bounds = Bounds::new(min, max);
+        Self::within(segment, &bounds, slack(&bounds))
+    }
+
+    /// The same; the slack is the bounds' [`slack`], which need not be computed for every segment.
+    #[inline]
+    pub(crate) fn within(segment: Segment, bounds: &Bounds, slack: f64) -> Self {
+        let Bounds { min, max } = *bounds;
         let d = segment.q - segment.p;
         let a = d.abs();
         let z = if a.x > a.y {
@@ -97,6 +108,7 @@ impl SegmentTest {
             scale: scale_z,
             edge_error: if usable { 128.0 * U * m2 } else { f64::INFINITY },
             t_error: 1024.0 * U * m2 * (m * scale_z.abs()).max(1.0),
+            slack,
         }
     }
 
@@ -134,6 +146,12 @@ impl SegmentTest {
     }
 
     /// Exactly: do segment and triangle meet? If so, where (rounded)?
+    ///
+    /// For triangles in the bounds given the place is rounded by at most 2⁻²⁰ of their largest coordinate, or it is in
+    /// the triangle's own box, enlarged by as much. (Both are measured along the largest component of the segment. A
+    /// start that is 2²⁸ times as far away adds its own rounding.) For `T/det` errs by at most `t_error`/det: `T` −
+    /// t·det, which is 0 for the true t, is a mean of `T` and `T − det`. If that is too much, t is clamped to the box,
+    /// where the true place is.
     #[inline(always)]
     #[must_use]
     pub fn intersect(&self, triangle: &Triangle) -> Option<TriangleHit> {
@@ -182,14 +200,50 @@ impl SegmentTest {
             if t_det > e && t_det - det < -e {
                 let inv_det = 1.0 / det;
                 let scale = inv_det * sign;
-                return Some(TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] });
+                let hit = TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] };
+                if self.t_error * self.length > self.slack * det {
+                    return Some(self.put_into_box(hit, &triangle()));
+                }
+                return Some(hit);
             }
         }
-        intersect_exact(&self.segment, &triangle())
+        let triangle = triangle();
+        intersect_exact(&self.segment, &triangle).map(|hit| self.put_into_box(hit, &triangle))
+    }
+
+    /// The hit with its place put into the box of the triangle, enlarged by the slack.
+    #[cold]
+    fn put_into_box(&self, hit: TriangleHit, triangle: &Triangle) -> TriangleHit {
+        let [a, b, c] = triangle.vertices_f64();
+        let (min, max) = (a.min(b).min(c) - self.slack, a.max(b).max(c) + self.slack);
+        let (p, d) = (self.segment.p, self.direction);
+        // Distances along the largest component.
+        let (mut near, mut far) = (0.0_f64, self.length);
+        for axis in 0..3 {
+            if d[axis] != 0.0 {
+                let (lower, upper) = ((min[axis] - p[axis]) / d[axis], (max[axis] - p[axis]) / d[axis]);
+                near = near.max(lower.min(upper));
+                far = far.min(lower.max(upper));
+            }
+        }
+        let place = hit.t * self.length;
+        if near <= place && place <= far {
+            return hit;
+        }
+        // The hierarchy relies on the nearer end, so that is the one that rounding must not undo.
+        TriangleHit { t: (place.min(far).max(near) / self.length).clamp(0.0, 1.0), ..hit }
     }
 }
 
-/// The same answer as [`SegmentTest::intersect`], by exact predicates only; the slow twin that decides close calls.
+/// How far outside the box of a triangle the place of a hit may be, in world units: 2⁻²⁰ of the largest coordinate. The
+/// hierarchy's padding covers it.
+#[must_use]
+pub(crate) fn slack(bounds: &Bounds) -> f64 {
+    bounds.largest_coordinate() / 1_048_576.0
+}
+
+/// The same answer as [`SegmentTest::intersect`], by exact predicates only; the slow twin that decides close calls. It
+/// knows no bounds of a scene, so the place of a grazing hit is not put into the triangle's box.
 #[cold]
 #[must_use]
 pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<TriangleHit> {

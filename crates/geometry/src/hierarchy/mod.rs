@@ -1,10 +1,26 @@
 //! The fallback: a bounding volume hierarchy (\[Ylitie2017, Meister2018\], built by obvhs) over exact triangle tests.
 //!
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test, so it
-//! never culls a triangle that the exact test would hit, and ties are broken by the triangle's number. So whether
-//! anything is hit, and by what, does not depend on the shape of the tree. Which hit is the first is a matter of
-//! rounded parameters: they are off by at most what [`SegmentTest::intersect`] says, which is much for grazing slivers,
-//! and a tree may cull one of two that are so close.
+//! never culls a triangle that the exact test would hit. So whether anything is hit, and by what, does not depend on
+//! the tree.
+//!
+//! *Which hit is the first* does not depend on it either. The first is that with the least (t, number) of all hits,
+//! where t is what [`SegmentTest::intersect`] computes: a function of the segment, the triangle and the bounds of the
+//! scene. The rounding of t is large for grazing slivers, so no triangle whose t is the least may be culled. Here is why
+//! it is not. (The place of t is its distance along the segment's largest component; lengths are in units of 2⁻²⁴ of
+//! the tree's space.) Let a ray end at a hit with parameter t₀, and let a triangle be hit at t ≤ t₀ as computed.
+//!
+//! 1. Boxes are culled only if the ray comes in beyond `end(t₀)`, which is at least `end(t)`. That is at least 48
+//!    beyond the place of t: 64 by the pad, less the rounding to single precision and of the start.
+//! 2. If the place of t is off by at most the slack of 16, `end(t)` is beyond the true place of the hit. That is a point
+//!    of the triangle, so the ray comes into all boxes around the triangle before it, also as computed.
+//! 3. Otherwise the place of t is in the triangle's box, enlarged by the slack of 16 and by 4 for the rounding of the
+//!    clamp. A point of the ray is off by at most 22 in a box test and by 8 for the ray's start (`space`). So a point
+//!    within 34 of the triangle's box is inside the padded boxes around it, and 20 is less: again the ray comes in before
+//!    the place of t. If that is in front of the ray's start, it is so by no more than 28; then `end(t)` is positive, and
+//!    a ray that starts in a box comes in at 0.
+//!
+//! Segments that start far away are traced from their end or tested against all triangles, and nothing is culled by t.
 //!
 //! What a ray is before it comes to the tree is decided here; `space` is the tree's own space and its padding, `layout`
 //! what the tree is made of, `build` how it comes about, `traverse` the way of a ray, `leaf` the triangles at its end.
@@ -22,7 +38,7 @@ use self::{
     space::{TreeDistance, TreeSpace},
     traverse::Start,
 };
-use crate::{Bounds, Segment, SegmentTest, Triangle};
+use crate::{Bounds, Segment, SegmentTest, Triangle, intersect::slack};
 
 /// The first triangle along a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +59,8 @@ pub struct Bvh {
     /// Of all triangles.
     bounds: Bounds,
     space: TreeSpace,
+    /// The [`slack`] of the bounds.
+    slack: f64,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -71,7 +89,7 @@ impl Bvh {
     pub fn new(triangles: &[Triangle]) -> Self {
         let bounds = Bounds::of_triangles(triangles);
         let space = TreeSpace::new(&bounds);
-        Self { tree: Tree::build(triangles, space), triangles: triangles.len(), bounds, space }
+        Self { tree: Tree::build(triangles, space), triangles: triangles.len(), bounds, space, slack: slack(&bounds) }
     }
 
     /// Bounds of the triangles; empty if there are none.
@@ -94,7 +112,7 @@ impl Bvh {
         if self.bounds.misses(segment) {
             return None;
         }
-        let test = SegmentTest::new(*segment, self.bounds.min, self.bounds.max);
+        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
         let mut best: Option<Hit> = None;
         let (ray, start) = match self.approach(&test) {
             Approach::Miss => return None,
@@ -109,7 +127,7 @@ impl Bvh {
             if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
                 best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             }
-            // Boxes beyond the hit are culled, but not those within 10⁻⁶ of it.
+            // Boxes beyond the hit are culled, but not those that may hold one with the same t or less.
             self.space.end(hit.t * test.length() - start)
         });
         best
@@ -122,7 +140,7 @@ impl Bvh {
         if self.bounds.misses(segment) {
             return false;
         }
-        let test = SegmentTest::new(*segment, self.bounds.min, self.bounds.max);
+        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
         let ray = match self.approach(&test) {
             Approach::Miss => return false,
             Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
@@ -142,7 +160,7 @@ impl Bvh {
         if self.bounds.misses(segment) {
             return;
         }
-        let test = SegmentTest::new(*segment, self.bounds.min, self.bounds.max);
+        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
         let ray = match self.approach(&test) {
             Approach::Miss => return,
             Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
