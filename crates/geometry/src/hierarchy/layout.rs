@@ -74,6 +74,14 @@ impl Child {
         (self.0 >> 3) as usize
     }
 
+    /// The same child where the nodes before it are so many more, and the leaves.
+    pub(super) fn shifted(self, [nodes, leaves]: [usize; 2]) -> Self {
+        match self.triangles() {
+            0 => Self::node(self.index() + nodes),
+            count => Self::leaf(self.index() + leaves, count as usize),
+        }
+    }
+
     /// 0 for a node.
     #[inline]
     pub(super) fn triangles(self) -> u32 {

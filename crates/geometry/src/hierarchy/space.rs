@@ -98,11 +98,11 @@ impl TreeSpace {
         TreeDistance(((distance * (1.0 + 1e-6) + self.pad) * self.scale) as f32)
     }
 
-    /// The box of a triangle with the [`PAD`] times `pads`, which is at least 1.
+    /// The box of a triangle, with the [`PAD`].
     #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding to single precision")]
-    pub(super) fn padded_box(self, triangle: &Triangle, pads: f64) -> TreeBox {
+    pub(super) fn padded_box(self, triangle: &Triangle) -> TreeBox {
         let [a, b, c] = triangle.vertices_f64().map(|v| self.point(v).0);
-        let pad = (PAD * pads) as f32;
+        let pad = PAD as f32;
         TreeBox { min: a.min(b).min(c) - pad, max: a.max(b).max(c) + pad }
     }
 }
