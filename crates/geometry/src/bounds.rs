@@ -67,7 +67,8 @@ impl Bounds {
         self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
     }
 
-    /// True only if the segment's own bounds and the box are disjoint, which is a comparison of exact numbers. False says nothing.
+    /// True only if the segment's own bounds and the box are disjoint, which is a comparison of exact numbers. False
+    /// says nothing.
     #[must_use]
     #[inline]
     pub fn misses(&self, segment: &Segment) -> bool {

@@ -7,7 +7,7 @@
 //! Guarantee: whether a segment meets a triangle is answered *exactly* for the single-precision vertices of the
 //! triangle and the double-precision end points of the segment. So the reach of the intersector's errors, which the
 //! voxelization has to cover, is zero; the test is watertight; and it gives the same answer for a reversed segment.
-//! Only the position of a hit is rounded.
+//! Only the position of a hit is rounded, and it stays in the box of the triangle, up to a millionth of the scene.
 //!
 //! *Deviation:* \[Woop2013\] computes in single precision and repeats an edge function in double precision if it is
 //! zero. That leaves an error of some ulps of the largest sheared coordinate in the decision, and an unbounded one
@@ -18,43 +18,13 @@
 
 use glam::DVec3;
 
-use crate::Triangle;
-
-/// A closed segment from `p` to `q`, in world units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
-    /// Start, at t = 0.
-    pub p: DVec3,
-    /// End, at t = 1.
-    pub q: DVec3,
-}
-
-impl Segment {
-    /// The segment from `p` to `q`.
-    #[must_use]
-    pub const fn new(p: DVec3, q: DVec3) -> Self {
-        Self { p, q }
-    }
-
-    /// The point at parameter `t` in [0, 1].
-    #[inline]
-    #[must_use]
-    pub fn at(&self, t: f64) -> DVec3 {
-        self.p + (self.q - self.p) * t
-    }
-
-    /// Its length in world units.
-    #[inline]
-    #[must_use]
-    pub fn length(&self) -> f64 {
-        (self.q - self.p).length()
-    }
-}
+use crate::{Bounds, Segment, Triangle};
 
 /// Where a segment meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleHit {
-    /// Parameter along the segment, in [0, 1]; rounded.
+    /// Parameter along the segment, in [0, 1]; rounded, but its place is within the box of the triangle
+    /// ([`SegmentTest::intersect`]).
     pub t: f64,
     /// Barycentric weights of the vertices; each in [0, 1], their sum is 1 up to rounding.
     pub barycentric: [f64; 3],
@@ -68,8 +38,8 @@ pub struct SegmentTest {
     direction: DVec3,
     /// That component's size, in world units.
     length: f64,
-    /// The axis of the largest component is the last. Those before it are in cyclic order, which keeps the orientation, or exchanged if the segment points
-    /// backwards along the last, which would mirror.
+    /// The axis of the largest component is the last. Those before it are in cyclic order, which keeps the orientation,
+    /// or exchanged if the segment points backwards along the last, which would mirror.
     axes: [usize; 3],
     /// By how much the first two coordinates change with the last.
     shear: [f64; 2],
@@ -79,6 +49,8 @@ pub struct SegmentTest {
     edge_error: f64,
     /// Largest error of `T` and of `T − det`, see [`SegmentTest::intersect`].
     t_error: f64,
+    /// How far outside the box of a triangle the place of a hit may be, in world units.
+    slack: f64,
 }
 
 /// Half an ulp of 1 in double precision.
@@ -87,15 +59,23 @@ const U: f64 = f64::EPSILON / 2.0;
 impl SegmentTest {
     /// Prepares `segment` for triangles within the box from `min` to `max`.
     ///
-    /// With `u` = 2⁻⁵³ and `m` the largest coordinate difference of a vertex and `segment.p`, a sheared coordinate is at most 2m
-    /// and is computed with an error of at most 8um (one subtraction, a shear factor of 3 roundings, a product, a
-    /// subtraction). An edge function is the difference of two products of these: error at most
+    /// With `u` = 2⁻⁵³ and `m` the largest coordinate difference of a vertex and `segment.p`, a sheared coordinate is
+    /// at most 2m and is computed with an error of at most 8um: one subtraction, a shear factor of 3 roundings, a
+    /// product, a subtraction. An edge function is the difference of two products of these. So its error is at most
     /// 2·(2·8um·2m + u·4m²) + u·8m² = 80um². `T` sums three products of an edge function (at most 8m²) and a depth
-    /// (at most m/|d_z|, 3 roundings): error at most 3·(80 + 4·8)um³/|d_z| + 3·u·24m³/|d_z| = 408um³/|d_z|; det, three edge
-    /// functions, errs by at most 240um² + 2u·24m². The constants below are rounded up to powers of two.
+    /// (at most m/|d_z|, 3 roundings). Its error is at most 3·(80 + 4·8)um³/|d_z| + 3·u·24m³/|d_z| = 408um³/|d_z|. That
+    /// of det, three edge functions, is at most 240um² + 2u·24m². The constants below are rounded up to powers of two.
     #[inline]
     #[must_use]
     pub fn new(segment: Segment, min: DVec3, max: DVec3) -> Self {
+        let bounds = Bounds::new(min, max);
+        Self::within(segment, &bounds, slack(&bounds))
+    }
+
+    /// The same; the slack is the bounds' [`slack`], which need not be computed for every segment.
+    #[inline]
+    pub(crate) fn within(segment: Segment, bounds: &Bounds, slack: f64) -> Self {
+        let Bounds { min, max } = *bounds;
         let d = segment.q - segment.p;
         let a = d.abs();
         let z = if a.x > a.y {
@@ -128,6 +108,7 @@ impl SegmentTest {
             scale: scale_z,
             edge_error: if usable { 128.0 * U * m2 } else { f64::INFINITY },
             t_error: 1024.0 * U * m2 * (m * scale_z.abs()).max(1.0),
+            slack,
         }
     }
 
@@ -165,6 +146,12 @@ impl SegmentTest {
     }
 
     /// Exactly: do segment and triangle meet? If so, where (rounded)?
+    ///
+    /// For triangles in the bounds given the place is rounded by at most 2⁻²⁰ of their largest coordinate, or it is in
+    /// the triangle's own box, enlarged by as much. (Both are measured along the largest component of the segment. A
+    /// start that is 2²⁸ times as far away adds its own rounding.) For `T/det` errs by at most `t_error`/det: `T` −
+    /// t·det, which is 0 for the true t, is a mean of `T` and `T − det`. If that is too much, t is clamped to the box,
+    /// where the true place is.
     #[inline(always)]
     #[must_use]
     pub fn intersect(&self, triangle: &Triangle) -> Option<TriangleHit> {
@@ -172,7 +159,8 @@ impl SegmentTest {
         self.intersect_coordinates(self.axes.map(|axis| [a[axis], b[axis], c[axis]]), || *triangle)
     }
 
-    /// The same from the vertices' coordinates along each of [`SegmentTest::axes`]; the triangle is asked for where the call is close.
+    /// The same from the vertices' coordinates along each of [`SegmentTest::axes`]; the triangle is asked for where the
+    /// call is close.
     #[inline(always)]
     pub(crate) fn intersect_coordinates(
         &self,
@@ -212,14 +200,50 @@ impl SegmentTest {
             if t_det > e && t_det - det < -e {
                 let inv_det = 1.0 / det;
                 let scale = inv_det * sign;
-                return Some(TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] });
+                let hit = TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] };
+                if self.t_error * self.length > self.slack * det {
+                    return Some(self.put_into_box(hit, &triangle()));
+                }
+                return Some(hit);
             }
         }
-        intersect_exact(&self.segment, &triangle())
+        let triangle = triangle();
+        intersect_exact(&self.segment, &triangle).map(|hit| self.put_into_box(hit, &triangle))
+    }
+
+    /// The hit with its place put into the box of the triangle, enlarged by the slack.
+    #[cold]
+    fn put_into_box(&self, hit: TriangleHit, triangle: &Triangle) -> TriangleHit {
+        let [a, b, c] = triangle.vertices_f64();
+        let (min, max) = (a.min(b).min(c) - self.slack, a.max(b).max(c) + self.slack);
+        let (p, d) = (self.segment.p, self.direction);
+        // Distances along the largest component.
+        let (mut near, mut far) = (0.0_f64, self.length);
+        for axis in 0..3 {
+            if d[axis] != 0.0 {
+                let (lower, upper) = ((min[axis] - p[axis]) / d[axis], (max[axis] - p[axis]) / d[axis]);
+                near = near.max(lower.min(upper));
+                far = far.min(lower.max(upper));
+            }
+        }
+        let place = hit.t * self.length;
+        if near <= place && place <= far {
+            return hit;
+        }
+        // The hierarchy relies on the nearer end, so that is the one that rounding must not undo.
+        TriangleHit { t: (place.min(far).max(near) / self.length).clamp(0.0, 1.0), ..hit }
     }
 }
 
-/// The same answer as [`SegmentTest::intersect`], by exact predicates only; the slow twin that decides close calls.
+/// How far outside the box of a triangle the place of a hit may be, in world units: 2⁻²⁰ of the largest coordinate. The
+/// hierarchy's padding covers it.
+#[must_use]
+pub(crate) fn slack(bounds: &Bounds) -> f64 {
+    bounds.largest_coordinate() / 1_048_576.0
+}
+
+/// The same answer as [`SegmentTest::intersect`], by exact predicates only; the slow twin that decides close calls. It
+/// knows no bounds of a scene, so the place of a grazing hit is not put into the triangle's box.
 #[cold]
 #[must_use]
 pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<TriangleHit> {
@@ -253,9 +277,9 @@ pub fn intersect_exact(segment: &Segment, triangle: &Triangle) -> Option<Triangl
     Some(TriangleHit { t, barycentric: [weight_a / sum, weight_b / sum, weight_c / sum] })
 }
 
-/// Where the segment crosses the triangle's plane. The predicates are certain of their sign, but their size may be nothing but rounding where an end
-/// is far away; here the segment's vector takes the place of the far end. `None` if the plane of so thin a triangle is not known to a
-/// thousandth, at this angle.
+/// Where the segment crosses the triangle's plane. The predicates are certain of their sign, but their size may be
+/// nothing but rounding where an end is far away; here the segment's vector takes the place of the far end. `None` if
+/// the plane of so thin a triangle is not known to a thousandth, at this angle.
 fn plane_parameter(segment: &Segment, triangle: &Triangle) -> Option<f64> {
     let [a, b, c] = triangle.vertices_f64();
     let d = segment.q - segment.p;

@@ -1,7 +1,8 @@
 //! Triangles, segments, and whether they meet: exactly.
 //!
-//! [`SegmentTest`] answers for one triangle, [`Bvh`] for all of a scene. Both answer for the very single-precision vertices and
-//! double-precision end points that they were given, so an answer never depends on rounding or on the shape of a tree.
+//! [`SegmentTest`] answers for one triangle, [`Bvh`] for all of a scene. Both answer for the very single-precision
+//! vertices and double-precision end points that they were given, so an answer never depends on rounding or on the
+//! shape of a tree.
 //!
 //! ```
 //! use glam::{DVec3, Vec3};
@@ -16,6 +17,7 @@
 mod bounds;
 mod hierarchy;
 mod intersect;
+mod segment;
 mod triangle;
 
 #[cfg(test)]
@@ -23,5 +25,6 @@ mod tests;
 
 pub use bounds::Bounds;
 pub use hierarchy::{Bvh, Hit};
-pub use intersect::{Segment, SegmentTest, TriangleHit, intersect_exact};
+pub use intersect::{SegmentTest, TriangleHit, intersect_exact};
+pub use segment::Segment;
 pub use triangle::Triangle;

@@ -1,21 +1,44 @@
 //! The fallback: a bounding volume hierarchy (\[Ylitie2017, Meister2018\], built by obvhs) over exact triangle tests.
 //!
-//! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test,
-//! so it never culls a triangle that the exact test would hit, and ties are broken by the triangle's number. So whether anything is
-//! hit, and by what, does not depend on the shape of the tree. Which hit is the first is a matter of rounded parameters: they are off by
-//! at most what [`SegmentTest::intersect`] says, which is much for grazing slivers, and a tree may cull one of two that are so close.
+//! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test, so it
+//! never culls a triangle that the exact test would hit. So whether anything is hit, and by what, does not depend on
+//! the tree.
 //!
-//! The tree has a space of its own: world coordinates times a power of two, so that the largest is about 1. Then its single
-//! precision neither overflows nor underflows whatever the unit of the scene, and the padding has one
-//! known weight.
+//! *Which hit is the first* does not depend on it either. The first is that with the least (t, number) of all hits,
+//! where t is what [`SegmentTest::intersect`] computes: a function of the segment, the triangle and the bounds of the
+//! scene. The rounding of t is large for grazing slivers, so no triangle whose t is the least may be culled. Here is why
+//! it is not. (The place of t is its distance along the segment's largest component; lengths are in units of 2⁻²⁴ of
+//! the tree's space.) Let a ray end at a hit with parameter t₀, and let a triangle be hit at t ≤ t₀ as computed.
+//!
+//! 1. Boxes are culled only if the ray comes in beyond `end(t₀)`, which is at least `end(t)`. That is at least 48
+//!    beyond the place of t: 64 by the pad, less the rounding to single precision and of the start.
+//! 2. If the place of t is off by at most the slack of 16, `end(t)` is beyond the true place of the hit. That is a point
+//!    of the triangle, so the ray comes into all boxes around the triangle before it, also as computed.
+//! 3. Otherwise the place of t is in the triangle's box, enlarged by the slack of 16 and by 4 for the rounding of the
+//!    clamp. A point of the ray is off by at most 22 in a box test and by 8 for the ray's start (`space`). So a point
+//!    within 34 of the triangle's box is inside the padded boxes around it, and 20 is less: again the ray comes in before
+//!    the place of t. If that is in front of the ray's start, it is so by no more than 28; then `end(t)` is positive, and
+//!    a ray that starts in a box comes in at 0.
+//!
+//! Segments that start far away are traced from their end or tested against all triangles, and nothing is culled by t.
+//!
+//! What a ray is before it comes to the tree is decided here; `space` is the tree's own space and its padding, `layout`
+//! what the tree is made of, `build` how it comes about, `traverse` the way of a ray, `leaf` the triangles at its end.
 
-mod wide;
+mod build;
+mod layout;
+mod leaf;
+mod space;
+mod traverse;
 
-use glam::{DVec3, Vec3A};
-use obvhs::aabb::Aabb;
+use glam::DVec3;
 
-use self::wide::{Start, Tree};
-use crate::{Bounds, Segment, SegmentTest, Triangle};
+use self::{
+    layout::Tree,
+    space::{TreeDistance, TreeSpace},
+    traverse::Start,
+};
+use crate::{Bounds, Segment, SegmentTest, Triangle, intersect::slack};
 
 /// The first triangle along a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,10 +58,9 @@ pub struct Bvh {
     triangles: usize,
     /// Of all triangles.
     bounds: Bounds,
-    /// Tree coordinates per world unit, a power of two.
-    scale: f64,
-    /// By how much the tree's boxes are larger than the triangles, in world units.
-    pad: f64,
+    space: TreeSpace,
+    /// The [`slack`] of the bounds.
+    slack: f64,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -47,55 +69,27 @@ impl std::fmt::Debug for Bvh {
     }
 }
 
-/// Padding of boxes in tree coordinates, where the largest coordinate m is below 1. With rays that start in the padded
-/// bounds, and so are no longer than their diagonal of 2√3, a point on the ray in a box test is off by at most (in units of
-/// 2⁻²⁴): origin 1, direction 2·2√3, clamp of small direction components 2·2√3, rounding of the boxes 1, the slab test
-/// (b − o)·(1/d): 2 each for the difference, at most 2, the reciprocal and the product. That is below 22; about three times as much is taken.
-const PAD: f64 = 64.0 / 16_777_216.0;
-
-/// Segments with both ends farther away than this, in multiples of the largest coordinate, are not traced in single precision.
-/// A point computed from the start is off by at most some 16·2⁻⁵³ times the start's distance: up to here by 2⁻²¹ of the
-/// largest coordinate, a small part of the half of [`PAD`] that its budget leaves over.
-const FAR: f64 = 268_435_456.0;
-
 /// How a segment comes to the hierarchy.
 enum Approach {
     /// It misses the padded bounds or has no length.
     Miss,
-    /// The tree's ray, and where it starts: the distance from the segment's start along its largest component, in world units.
+    /// The tree's ray, and where it starts: the distance from the segment's start along its largest component, in world
+    /// units.
     Ray(Start, f64),
     /// The tree's ray from the segment's end, because its start is too far away.
     Backwards(Start),
-    /// Both ends are so far away that single precision does not do. Hardly any such segment comes near; then all triangles are tested.
+    /// Both ends are so far away that single precision does not do. Hardly any such segment comes near; then all
+    /// triangles are tested.
     Far,
 }
 
 impl Bvh {
     /// Builds the hierarchy. Cost: O(n log n); about 1 µs a triangle.
     #[must_use]
-    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding to single precision")]
     pub fn new(triangles: &[Triangle]) -> Self {
         let bounds = Bounds::of_triangles(triangles);
-        let largest = bounds.largest_coordinate();
-        // Vertices are single precision, so the exponent is at most 128 and at least −149.
-        let scale = if largest > 0.0 { (-largest.log2().floor() - 1.0).exp2() } else { 1.0 };
-        let boxes: Vec<Aabb> = triangles
-            .iter()
-            .zip(0_u32..)
-            .map(|(t, number)| {
-                let mut b = Aabb::empty();
-                for v in t.vertices_f64() {
-                    b.extend(Vec3A::from((v * scale).as_vec3()));
-                }
-                // Among equal boxes obvhs joins one pair at a time, into a chain, in quadratic time. So few are equal: Fibonacci
-                // hashing spreads the numbers of neighbours over some hundred pads.
-                let unequal = f64::from(number.wrapping_mul(0x9E37_79B9)) / f64::from(u32::MAX);
-                let pad = (PAD * (1.0 + unequal)) as f32;
-                Aabb::new(b.min - pad, b.max + pad)
-            })
-            .collect();
-        let tree = Tree::new(triangles, &boxes);
-        Self { tree, triangles: triangles.len(), bounds, scale, pad: PAD / scale }
+        let space = TreeSpace::new(&bounds);
+        Self { tree: Tree::build(triangles, space), triangles: triangles.len(), bounds, space, slack: slack(&bounds) }
     }
 
     /// Bounds of the triangles; empty if there are none.
@@ -118,7 +112,7 @@ impl Bvh {
         if self.bounds.misses(segment) {
             return None;
         }
-        let test = SegmentTest::new(*segment, self.bounds.min, self.bounds.max);
+        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
         let mut best: Option<Hit> = None;
         let (ray, start) = match self.approach(&test) {
             Approach::Miss => return None,
@@ -129,12 +123,12 @@ impl Bvh {
                 return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
             }
         };
-        self.tree.traverse(ray, &test, self.scale, |hit, triangle| {
+        self.tree.traverse(ray, &test, self.space, |hit, triangle| {
             if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
                 best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             }
-            // Boxes beyond the hit are culled, but not those within 10⁻⁶ of it.
-            self.ray_parameter(hit.t * test.length() - start)
+            // Boxes beyond the hit are culled, but not those that may hold one with the same t or less.
+            self.space.end(hit.t * test.length() - start)
         });
         best
     }
@@ -146,16 +140,16 @@ impl Bvh {
         if self.bounds.misses(segment) {
             return false;
         }
-        let test = SegmentTest::new(*segment, self.bounds.min, self.bounds.max);
+        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
         let ray = match self.approach(&test) {
             Approach::Miss => return false,
             Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
             Approach::Far => return self.all_hits(&test).next().is_some(),
         };
         let mut occluded = false;
-        self.tree.traverse(ray, &test, self.scale, |_, _| {
+        self.tree.traverse(ray, &test, self.space, |_, _| {
             occluded = true;
-            f32::NEG_INFINITY
+            TreeDistance::NEG_INFINITY
         });
         occluded
     }
@@ -166,15 +160,15 @@ impl Bvh {
         if self.bounds.misses(segment) {
             return;
         }
-        let test = SegmentTest::new(*segment, self.bounds.min, self.bounds.max);
+        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
         let ray = match self.approach(&test) {
             Approach::Miss => return,
             Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
             Approach::Far => return self.all_hits(&test).for_each(visit),
         };
-        self.tree.traverse(ray, &test, self.scale, |hit, triangle| {
+        self.tree.traverse(ray, &test, self.space, |hit, triangle| {
             visit(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
-            f32::INFINITY
+            TreeDistance::INFINITY
         });
     }
 
@@ -193,23 +187,17 @@ impl Bvh {
             return Approach::Miss;
         }
         let Segment { p, q } = *test.segment();
-        if !self.is_far(p) {
+        if !self.space.is_far(p) {
             return self
                 .ray(p, direction, test.length())
                 .map_or(Approach::Miss, |(ray, start)| Approach::Ray(ray, start));
         }
-        if !self.is_far(q) {
+        if !self.space.is_far(q) {
             return self.ray(q, -direction, test.length()).map_or(Approach::Miss, |(ray, _)| Approach::Backwards(ray));
         }
         // The rounding of what `passes` computes, as for `FAR`.
-        let pad = self.pad + 16.0 * f64::EPSILON * p.abs().max_element();
+        let pad = self.space.pad() + 16.0 * f64::EPSILON * p.abs().max_element();
         self.passes(p, direction, test.length(), pad).map_or(Approach::Miss, |_| Approach::Far)
-    }
-
-    /// The pad is in proportion to the largest coordinate.
-    #[inline]
-    fn is_far(&self, p: DVec3) -> bool {
-        p.abs().max_element() * PAD > FAR * self.pad
     }
 
     /// Where a segment from `origin` comes to the bounds with this pad, if it does.
@@ -229,16 +217,8 @@ impl Bvh {
     /// The tree's ray for a segment that starts here, and at which distance it starts.
     #[inline(always)]
     fn ray(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<(Start, f64)> {
-        let start = self.passes(origin, direction, length, self.pad)?;
+        let start = self.passes(origin, direction, length, self.space.pad())?;
         let origin = origin + direction * start;
-        Some((Start { origin, direction, end: self.ray_parameter(length - start) }, start))
-    }
-
-    /// The parameter of a tree's ray at this distance from its start (measured along the largest component), rounded up by more than the
-    /// rounding of a box test.
-    #[inline]
-    #[allow(clippy::cast_possible_truncation, reason = "the pad covers the rounding")]
-    fn ray_parameter(&self, distance: f64) -> f32 {
-        ((distance * (1.0 + 1e-6) + self.pad) * self.scale) as f32
+        Some((Start { origin, direction, end: self.space.end(length - start) }, start))
     }
 }
