@@ -14,7 +14,7 @@ use crate::{
 
 /// The airlight integral along +Z with any transmittance towards the light.
 fn airlight(scene: &Scene, z: (f64, f64)) -> f64 {
-    let media = Media::of_scene(&scene);
+    let media = Media::of_scene(scene);
     let Emitter::Point { position, intensity } = scene.emitters[0] else { panic!("a point light") };
     let Medium { sigma_t, albedo, phase } = scene.media[0];
     let outside = Segment::new(dvec3(0.0, 0.0, -99.0), DVec3::ZERO);

@@ -10,7 +10,7 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
 use vdf_image::metrics::PIXELS_PER_DEGREE;
-use vdf_render::Integrator;
+use vdf_render::{GridExtent, Integrator};
 use vdf_scene::PixelRect;
 use vdf_visibility::{Method, UnknownMethod};
 
@@ -57,9 +57,12 @@ pub(crate) struct RenderArgs {
     /// point and area lights and without --segment-first]
     #[arg(long, value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Option<Method>,
-    /// Side of a voxel in world units [default: a 128th of the scene's longest side]
+    /// Side of a voxel in world units [default: a 128th of the longest side of what they cover]
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
+    /// What the voxels cover: the occluders and the lights near them, or the whole scene with fog and camera
+    #[arg(long, value_enum, default_value_t = GridName::Occluders)]
+    pub(crate) grid: GridName,
     /// How light is followed
     #[arg(long, value_name = "INTEGRATOR", default_value = "volpath", value_parser = integrator_parser())]
     pub(crate) integrator: Integrator,
@@ -81,6 +84,9 @@ pub(crate) struct RenderArgs {
     /// Number of threads [default: one for each processor]
     #[arg(short = 'j', long, value_name = "N")]
     pub(crate) threads: Option<usize>,
+    /// Which sensor of the scene file, counted from 0 [default: the first]
+    #[arg(long, value_name = "N")]
+    pub(crate) sensor: Option<usize>,
     /// Set a parameter of the scene file; may be given several times
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub(crate) defines: Vec<(String, String)>,
@@ -100,6 +106,21 @@ pub(crate) struct RenderArgs {
     /// No progress and no statistics in words; errors and warnings only
     #[arg(short, long)]
     pub(crate) quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum GridName {
+    Occluders,
+    Scene,
+}
+
+impl From<GridName> for GridExtent {
+    fn from(name: GridName) -> Self {
+        match name {
+            GridName::Occluders => Self::Occluders,
+            GridName::Scene => Self::Scene,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -158,15 +179,21 @@ pub(crate) struct VerifyArgs {
     /// Methods, separated by commas; all are asked about the same segments
     #[arg(long = "method", default_value = "all", value_name = "all|METHOD", value_delimiter = ',')]
     pub(crate) methods: Vec<Methods>,
-    /// Sides of voxels in world units, separated by commas [default: a 128th of the scene's longest side]
+    /// Sides of voxels in world units, separated by commas [default: a 128th of the longest side of what they cover]
     #[arg(long = "voxel", value_name = "SIZE", value_delimiter = ',', allow_negative_numbers = true)]
     pub(crate) voxel_sizes: Vec<f64>,
+    /// What the voxels cover: the occluders and the lights near them, or the whole scene with fog and camera
+    #[arg(long, value_enum, default_value_t = GridName::Occluders)]
+    pub(crate) grid: GridName,
     /// Seed of the segments
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) seed: u64,
     /// Number of threads [default: one for each processor]
     #[arg(short = 'j', long, value_name = "N")]
     pub(crate) threads: Option<usize>,
+    /// Which sensor of the scene file, counted from 0 [default: the first]
+    #[arg(long, value_name = "N")]
+    pub(crate) sensor: Option<usize>,
     /// Set a parameter of the scene file; may be given several times
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub(crate) defines: Vec<(String, String)>,
@@ -209,9 +236,12 @@ Exit codes: 0 done, 1 failure while writing, 2 usage or scene error, 130 interru
 pub(crate) struct VoxelizeArgs {
     /// A scene file (a subset of Mitsuba 3 XML) or the name of a built-in scene [default: cbox_vol2]
     pub(crate) scene: Option<PathBuf>,
-    /// Side of a voxel in world units [default: a 128th of the scene's longest side]
+    /// Side of a voxel in world units [default: a 128th of the longest side of what they cover]
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
+    /// What the voxels cover: the occluders and the lights near them, or the whole scene with fog and camera
+    #[arg(long, value_enum, default_value_t = GridName::Occluders)]
+    pub(crate) grid: GridName,
     /// Method that proves which voxels see a light
     #[arg(long, default_value_t, value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Method,
@@ -221,6 +251,9 @@ pub(crate) struct VoxelizeArgs {
     /// Number of threads [default: one for each processor]
     #[arg(short = 'j', long, value_name = "N")]
     pub(crate) threads: Option<usize>,
+    /// Which sensor of the scene file, counted from 0 [default: the first]
+    #[arg(long, value_name = "N")]
+    pub(crate) sensor: Option<usize>,
     /// Set a parameter of the scene file; may be given several times
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub(crate) defines: Vec<(String, String)>,
@@ -294,7 +327,10 @@ fn parse_define(text: &str) -> Result<(String, String), String> {
 fn parse_count(text: &str) -> Result<u64, String> {
     let floating =
         || text.parse::<f64>().ok().filter(|x| x.fract() == 0.0 && (0.0..=1e15).contains(x)).map(|x| x as u64);
-    text.parse().ok().or_else(floating).ok_or_else(|| "expected a whole number such as 5000000 or 1e8".to_owned())
+    let count: Option<u64> = text.parse().ok().or_else(floating);
+    count
+        .filter(|n| *n <= 1_000_000_000_000_000)
+        .ok_or_else(|| "expected a whole number of at most 1e15, such as 5000000 or 1e8".to_owned())
 }
 
 fn parse_crop(text: &str) -> Result<PixelRect, String> {

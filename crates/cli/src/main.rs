@@ -18,8 +18,14 @@ use crate::{
 };
 
 fn main() -> ExitCode {
-    // Clap prints its own usage errors and exits with 2.
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        // Help and version go to stdout, usage errors to stderr; clap knows which, but not whether they arrived.
+        Err(message) => {
+            let code = u8::try_from(message.exit_code()).unwrap_or(2);
+            return if message.print().is_ok() { code.into() } else { ExitCode::FAILURE };
+        }
+    };
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),

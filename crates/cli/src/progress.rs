@@ -11,6 +11,7 @@ use std::{
 
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
+use vdf_image::remove_temporaries;
 use vdf_render::Progress;
 
 use crate::failure::{Failure, say};
@@ -22,6 +23,8 @@ pub(crate) struct Reporter {
     total: AtomicU64,
     done: AtomicU64,
     interrupted: Arc<AtomicBool>,
+    /// Whether something may be half written, so that the program must not end at once.
+    writes: Arc<AtomicBool>,
 }
 
 /// What the lines are about.
@@ -34,12 +37,18 @@ struct Lines {
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 impl Reporter {
-    /// A reporter that also stops the work on Ctrl-C; a second Ctrl-C ends the program at once.
+    /// A reporter that also stops the work on Ctrl-C: at once while nothing is written ([`Reporter::writes`]), else where the work looks;
+    /// a second Ctrl-C ends the program in any case. No temporary file stays behind.
     pub(crate) fn new(quiet: bool) -> Result<Self, Failure> {
-        let interrupted = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&interrupted);
+        let (interrupted, writes) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let (flag, busy) = (Arc::clone(&interrupted), Arc::clone(&writes));
         ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::Relaxed) {
+            let again = flag.swap(true, Ordering::Relaxed);
+            if again || !busy.load(Ordering::Relaxed) {
+                remove_temporaries();
+                if !again {
+                    let _ = Failure::Interrupted.report();
+                }
                 std::process::exit(130);
             }
         })
@@ -54,7 +63,7 @@ impl Reporter {
             bar
         });
         let lines = (!quiet && !terminal).then(|| Mutex::new(Lines { phase: String::new(), last: Instant::now() }));
-        Ok(Self { bar, lines, total: AtomicU64::new(0), done: AtomicU64::new(0), interrupted })
+        Ok(Self { bar, lines, total: AtomicU64::new(0), done: AtomicU64::new(0), interrupted, writes })
     }
 
     /// Removes the bar.
@@ -62,6 +71,11 @@ impl Reporter {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+
+    /// From now on something is written: Ctrl-C lets the file at hand be finished.
+    pub(crate) fn writes(&self) {
+        self.writes.store(true, Ordering::Relaxed);
     }
 
     /// Whether Ctrl-C was pressed.

@@ -15,6 +15,9 @@ pub enum RenderError {
     /// The provers of the method could not be built.
     #[error(transparent)]
     Visibility(#[from] vdf_visibility::VisibilityError),
+    /// There is no memory for the film.
+    #[error(transparent)]
+    Film(#[from] vdf_image::ImageError),
     /// The threads could not be started.
     #[error("cannot start the rendering threads: {message}")]
     Threads {

@@ -4,7 +4,7 @@ use std::{ops::Range, sync::Arc, time::Instant};
 
 use vdf_geometry::Bounds;
 use vdf_scene::Scene;
-use vdf_visibility::{BuildReport, Method, ProverOptions, Provers, Visibility};
+use vdf_visibility::{BuildReport, Method, ProverOptions, Provers, Visibility, VisibilityError};
 
 use crate::{
     Film, PrepareOptions, Progress, RenderError, RenderOptions, Rendering, World,
@@ -26,6 +26,7 @@ pub struct PreparedScene {
     method: Method,
     provers: Provers,
     build: BuildReport,
+    notes: Vec<String>,
 }
 
 impl PreparedScene {
@@ -72,11 +73,19 @@ impl PreparedScene {
         let lights = light_shapes(&scene);
         let bounds = *world.grid_bounds(options.grid);
         let method = options.method.unwrap_or_else(|| Method::for_lights(&lights));
-        let voxel_size = options.voxel_size.unwrap_or_else(|| default_voxel_size(&bounds));
-        let options = ProverOptions { method, voxel_size, max_voxels: options.max_voxels, ..ProverOptions::default() };
-        let (provers, build) = Provers::build(&options, &world.triangles, bounds, &lights)?;
+        let build = |method, voxel_size| {
+            let options =
+                ProverOptions { method, voxel_size, max_voxels: options.max_voxels, ..ProverOptions::default() };
+            Provers::build(&options, &world.triangles, bounds, &lights)
+        };
+        let mut notes = Vec::new();
+        let built = match options.voxel_size {
+            Some(size) => build(method, size).map(|built| (method, built)),
+            None => build_by_default(method, default_voxel_size(&bounds), build, &mut notes),
+        };
+        let (method, (provers, build)) = built?;
         drop(lights);
-        Ok(Self { scene, world, t_hierarchy, method, provers, build })
+        Ok(Self { scene, world, t_hierarchy, method, provers, build, notes })
     }
 
     /// Renders the scene. Builds nothing.
@@ -145,6 +154,12 @@ impl PreparedScene {
         &self.build
     }
 
+    /// What was done otherwise than by default, and why; one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
     /// Seconds that the hierarchy took, with all that does not depend on the method.
     #[must_use]
     pub const fn t_hierarchy(&self) -> f64 {
@@ -156,6 +171,28 @@ impl PreparedScene {
     pub fn visibility(&self) -> Visibility<'_> {
         Visibility::new(&self.world.bvh, &self.provers)
     }
+}
+
+/// Builds with a voxel size that nobody asked for. So it is never the error: where it does not fit, a coarser one is taken, or no method.
+fn build_by_default(
+    method: Method,
+    size: f64,
+    build: impl Fn(Method, f64) -> Result<(Provers, BuildReport), VisibilityError>,
+    notes: &mut Vec<String>,
+) -> Result<(Method, (Provers, BuildReport)), VisibilityError> {
+    let error = match build(method, size) {
+        Ok(built) => return Ok((method, built)),
+        Err(error) => error,
+    };
+    let VisibilityError::Voxel(voxel_error) = &error else { return Err(error) };
+    if let Some(smallest) = voxel_error.smallest_usable()
+        && let Ok(built) = build(method, smallest)
+    {
+        notes.push(format!("voxels are {smallest} units wide, not a 128th of the scene: {error}"));
+        return Ok((method, built));
+    }
+    notes.push(format!("rendered without a method: {error}"));
+    Ok((Method::NONE, build(Method::NONE, size)?))
 }
 
 /// A 128th of the longest side of these bounds, the side of a voxel where none is given; 1 if they are one point.

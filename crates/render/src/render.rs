@@ -3,7 +3,7 @@
 //! Every random number is a function of (seed, pixel, sample, dimension), and the samples of a pixel are summed in a fixed tree (`film.rs`).
 //! So the image does not depend on threads, tiles, crop or method, nor on how its samples are divided.
 
-use std::{ops::Range, time::Instant};
+use std::{ops::Range, sync::Mutex, time::Instant};
 
 use rayon::prelude::*;
 use vdf_image::Image;
@@ -34,27 +34,27 @@ pub(crate) fn render<'a>(job: &Job<'a>, progress: &'a dyn Progress) -> Result<Re
     let start = Instant::now();
     let [width, height] = job.size();
     progress.work_total(u64::from(width) * u64::from(height));
-    let tiles = job.tiles();
-    let rendered: Vec<_> = tiles
-        .par_iter()
-        .map(|tile| {
-            let result = render_tile(job, *tile, progress)?;
-            progress.work_done(result.0.len() as u64);
-            Ok(result)
-        })
-        .collect::<Result<_, RenderError>>()?;
-
+    // Before the first sample is taken: a film that does not fit is told at once.
     let (film, crop) = (&job.prepared().scene().film, job.crop());
-    let mut image = Image::cropped([film.width, film.height], [crop.x0, crop.y0], [width, height]);
-    let mut counters = Counters::default();
-    for (tile, (tile_pixels, tile_counters)) in tiles.iter().zip(rendered) {
-        counters += tile_counters;
-        let row = (tile.x1 - tile.x0) as usize;
-        for (y, line) in (tile.y0..).zip(tile_pixels.chunks_exact(row)) {
-            let first = (y - crop.y0) as usize * width as usize + (tile.x0 - crop.x0) as usize;
-            image.pixels[first..first + row].copy_from_slice(line);
-        }
-    }
+    let image = Image::try_cropped([film.width, film.height], [crop.x0, crop.y0], [width, height])?;
+    // Locked once a tile.
+    let image = Mutex::new(image);
+    let counters = job
+        .tiles()
+        .into_par_iter()
+        .map(|tile| {
+            let (pixels, counters) = render_tile(job, tile, progress)?;
+            if let Ok(mut image) = image.lock() {
+                put(&mut image, crop, tile, &pixels);
+            }
+            progress.work_done(pixels.len() as u64);
+            Ok(counters)
+        })
+        .try_reduce(Counters::default, |mut a, b| {
+            a += b;
+            Ok::<_, RenderError>(a)
+        })?;
+    let image = image.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     let statistics = Statistics::new(job, &counters, start.elapsed().as_secs_f64());
     Ok(Rendering { image, statistics })
 }
@@ -74,6 +74,15 @@ fn render_tile<'a>(
         })
         .collect::<Result<_, RenderError>>()?;
     Ok((pixels, counters))
+}
+
+/// Puts the pixels of a tile at their place in the image of `crop`.
+fn put(image: &mut Image, crop: PixelRect, tile: PixelRect, pixels: &[Rgb]) {
+    let (width, row) = (image.width as usize, (tile.x1 - tile.x0) as usize);
+    for (y, line) in (tile.y0..).zip(pixels.chunks_exact(row)) {
+        let first = (y - crop.y0) as usize * width + (tile.x0 - crop.x0) as usize;
+        image.pixels[first..first + row].copy_from_slice(line);
+    }
 }
 
 /// Some samples of every pixel, on the current pool of threads.

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::io::{self, BufRead, BufReader, Read as _};
 use std::path::{Component, Path, PathBuf};
+use std::sync::Mutex;
 
 /// One file of an embedded scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,17 +15,19 @@ pub struct EmbeddedFile {
 }
 
 /// A scene that can be loaded.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct SceneSource {
     main: PathBuf,
     embedded: Option<Vec<EmbeddedFile>>,
+    /// The files of the disk that were opened.
+    opened: Mutex<Vec<PathBuf>>,
 }
 
 impl SceneSource {
     /// A scene file on disk.
     #[must_use]
     pub fn disk(path: &Path) -> Self {
-        Self { main: path.to_path_buf(), embedded: None }
+        Self { main: path.to_path_buf(), embedded: None, opened: Mutex::default() }
     }
 
     /// A scene in memory: the scene file, and the files that it names relative to itself. Nothing is read from disk.
@@ -33,13 +36,19 @@ impl SceneSource {
         let main = PathBuf::from(scene.path.as_ref());
         let mut files = vec![scene];
         files.extend(others);
-        Self { main, embedded: Some(files) }
+        Self { main, embedded: Some(files), opened: Mutex::default() }
     }
 
     /// Path of the scene file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.main
+    }
+
+    /// The files of the disk that loading has opened so far: the scene file, what it includes, and its meshes. An output must not replace one.
+    #[must_use]
+    pub fn opened_files(&self) -> Vec<PathBuf> {
+        self.opened.lock().map_or_else(|poisoned| poisoned.into_inner().clone(), |files| files.clone())
     }
 
     /// The embedded files, the scene file first; empty for a scene on disk. Written to a folder under these names
@@ -89,6 +98,9 @@ impl SceneSource {
         }
         if metadata.len() > most {
             return Err(too_large(metadata.len()));
+        }
+        if let Ok(mut opened) = self.opened.lock() {
+            opened.push(path.to_path_buf());
         }
         // A file can grow while it is read, and some files of the system claim to be empty.
         let bounded = std::fs::File::open(path)?.take(most);

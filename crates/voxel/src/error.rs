@@ -92,3 +92,16 @@ pub enum VoxelError {
 fn gib(bytes: u64) -> f64 {
     bytes as f64 / f64::from(1 << 30)
 }
+
+impl VoxelError {
+    /// A voxel size that would work in place of the one that was asked for, if that is what is wrong.
+    #[must_use]
+    pub const fn smallest_usable(&self) -> Option<f64> {
+        match *self {
+            Self::TooFine { smallest, .. }
+            | Self::TooManyVoxels { smallest, .. }
+            | Self::TooMuchMemory { smallest, .. } => Some(smallest),
+            _ => None,
+        }
+    }
+}

@@ -7,12 +7,14 @@ use std::{
 
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
-use vdf_image::{AttributeValue, StagedFile, check_writable, stage_exr, stage_png};
+use vdf_image::{
+    AttributeValue, ComponentFormat, ExrOptions, StagedFile, check_distinct, check_writable, stage_exr_with, stage_png,
+};
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
     Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Statistics, TransmittanceEstimator,
 };
-use vdf_scene::{LoadOptions, Scene};
+use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
 use vdf_visibility::Method;
 
@@ -28,19 +30,20 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         // Proofs of flights need a method, whatever the lights.
         method: args.method.or_else(|| args.segment_first.then(Method::default)),
         voxel_size: args.voxel,
+        grid: args.grid.into(),
         threads: args.threads,
         ..PrepareOptions::default()
     };
     prepare.validate()?;
-    let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
-    options.validate(&scene)?;
-    let output = output(args, &name)?;
-    for warning in &scene.warnings {
-        say(format_args!("warning: {warning}"));
-    }
+    let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
+    options.validate(&named.scene)?;
+    let output = output(args, &named)?;
+    named.warn();
+    let Named { name, scene, .. } = named;
 
     let reporter = Reporter::new(args.quiet)?;
     let prepared = PreparedScene::new(scene, &prepare, &reporter)?;
+    prepared.notes().iter().for_each(|note| say(format_args!("note: {note}")));
     let rendering = prepared.render(&options, &reporter);
     let stream = match (&rendering, &args.record_queries) {
         (Ok(_), Some(_)) => Some(record_queries(&prepared, &options, args.max_queries, &reporter)).transpose(),
@@ -48,16 +51,24 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     };
     reporter.finish();
     let (rendering, stream) = (rendering?, stream?);
+    reporter.writes();
     // A Ctrl-C after the last tile: the promise is that nothing is written.
     if reporter.interrupted() {
         return Err(Failure::Interrupted);
     }
 
+    if args.quiet && rendering.statistics.refused > 0 {
+        say(format_args!(
+            "warning: {} samples were not finite or negative and were left out",
+            rendering.statistics.refused
+        ));
+    }
+    let attributes = attributes(&rendering.statistics, &name, prepared.scene());
+    write_all(&rendering, &output, args, prepared.scene(), &attributes)?;
+    // Last, so that queries do not stay without their picture.
     if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
         write_stream(path, stream)?;
     }
-    let attributes = attributes(&rendering.statistics, &name, prepared.scene());
-    write_all(&rendering, &output, args, &attributes)?;
     let stdout = &mut std::io::stdout();
     if !args.quiet {
         writeln!(stdout, "{}", rendering.statistics)?;
@@ -107,25 +118,53 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
     })
 }
 
-/// The scene and its name: a file if there is one of that path, else a built-in scene. A folder is no scene, so it hides none.
-pub(super) fn load(scene: Option<&Path>, defines: &[(String, String)]) -> Result<(String, Scene), Failure> {
-    let options = LoadOptions { defines: defines.to_vec(), ..LoadOptions::default() };
+/// A scene as the command line names it.
+pub(super) struct Named {
+    pub(super) name: String,
+    pub(super) scene: Scene,
+    /// The files that it was read from; none for a built-in scene.
+    pub(super) inputs: Vec<PathBuf>,
+}
+
+impl Named {
+    /// Fails if one of the outputs would replace a file of the scene, or another output.
+    pub(super) fn check_outputs(&self, outputs: &[(&str, &Path)]) -> Result<(), Failure> {
+        let inputs: Vec<&Path> = self.inputs.iter().map(PathBuf::as_path).collect();
+        check_distinct(outputs, &inputs).map_err(|conflict| Failure::Usage(conflict.into()))
+    }
+
+    /// Says what the scene file may not have meant.
+    pub(super) fn warn(&self) {
+        self.scene.warnings.iter().for_each(|warning| say(format_args!("warning: {warning}")));
+    }
+}
+
+/// The scene: a file if there is one of that path, else a built-in one. A folder is no scene, so it hides none.
+pub(super) fn load(
+    scene: Option<&Path>,
+    defines: &[(String, String)],
+    sensor: Option<usize>,
+) -> Result<Named, Failure> {
+    let options = LoadOptions { defines: defines.to_vec(), sensor };
     let path = scene.unwrap_or(Path::new(DEFAULT_SCENE));
     if scene.is_none() || !path.exists() || path.is_dir() {
         if let Some(source) = path.to_str().and_then(builtin) {
-            return Ok((path.display().to_string(), Scene::from_source(&source, &options)?));
+            let name = path.display().to_string();
+            return Ok(Named { name, scene: Scene::from_source(&source, &options)?, inputs: vec![] });
         }
         let what = if path.is_dir() { "a folder; name the scene file in it" } else { "no such file" };
         let (path, names) = (path.display(), builtin_names().join(", "));
         return Err(Failure::Usage(anyhow!("{path}: {what}, nor a built-in scene; the built-in scenes are {names}")));
     }
-    let stem = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
-    Ok((stem, Scene::load(path, &options)?))
+    let name = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
+    let source = SceneSource::disk(path);
+    let scene = Scene::from_source(&source, &options)?;
+    Ok(Named { name, scene, inputs: source.opened_files() })
 }
 
 /// Where to write; fails now rather than after an hour of rendering.
-fn output(args: &RenderArgs, name: &str) -> Result<Output, Failure> {
-    let exr = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.exr")));
+fn output(args: &RenderArgs, named: &Named) -> Result<Output, Failure> {
+    let exr = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", named.name)));
     if exr.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
         return Err(Failure::Usage(anyhow!(
             "{}: the output must end in .exr; a .png is written beside it",
@@ -133,26 +172,18 @@ fn output(args: &RenderArgs, name: &str) -> Result<Output, Failure> {
         )));
     }
     let png = exr.with_extension("png");
-    for (option, path) in [("stats", &args.stats), ("record-queries", &args.record_queries)] {
-        if let Some(path) = path.as_ref().filter(|s| is_same(s, &exr) || is_same(s, &png)) {
-            return Err(Failure::Usage(anyhow!("--{option} {}: the image is written there", path.display())));
-        }
-    }
-    if let (Some(a), Some(b)) = (&args.stats, &args.record_queries)
-        && is_same(a, b)
-    {
-        return Err(Failure::Usage(anyhow!("--record-queries {}: the statistics are written there", b.display())));
-    }
-    for path in [Some(&exr), Some(&png), args.stats.as_ref(), args.record_queries.as_ref()].into_iter().flatten() {
+    let outputs = [
+        ("--output", Some(&exr)),
+        ("the PNG beside it", Some(&png)),
+        ("--stats", args.stats.as_ref()),
+        ("--record-queries", args.record_queries.as_ref()),
+    ];
+    let outputs = outputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
+    named.check_outputs(&outputs.clone().collect::<Vec<_>>())?;
+    for (_, path) in outputs {
         check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
     }
     Ok(Output { exr, png })
-}
-
-/// Whether both paths name one file, which need not exist yet.
-fn is_same(a: &Path, b: &Path) -> bool {
-    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
-    absolute(a) == absolute(b)
 }
 
 /// Writes the statistics, the PNG and the EXR, and only when all are written moves them to their places, the EXR last: who waits for
@@ -161,14 +192,20 @@ fn write_all(
     rendering: &Rendering,
     output: &Output,
     args: &RenderArgs,
+    scene: &Scene,
     attributes: &[(&str, AttributeValue)],
 ) -> Result<(), Failure> {
+    let format = match scene.film.component_format {
+        vdf_scene::ComponentFormat::Float16 => ComponentFormat::Half,
+        vdf_scene::ComponentFormat::Float32 => ComponentFormat::Float,
+    };
+    let options = ExrOptions::default().with_component_format(format);
     let mut files = Vec::new();
     if let Some(path) = &args.stats {
         files.push(stage_json(path, &rendering.statistics)?);
     }
     files.push(stage_png(&output.png, &rendering.image)?);
-    files.push(stage_exr(&output.exr, &rendering.image, attributes)?);
+    files.push(stage_exr_with(&output.exr, &rendering.image, attributes, &options)?);
     StagedFile::persist_all(files).map_err(|error| Failure::Work(error.into()))
 }
 

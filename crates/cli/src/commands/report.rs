@@ -1,13 +1,9 @@
 //! `vdf report`: options in, files out. What is measured is in `vdf-lab`.
 
-use std::{
-    env,
-    io::Write as _,
-    path::{Path, PathBuf},
-};
+use std::{env, io::Write as _, path::Path};
 
-use anyhow::{Context as _, anyhow};
-use vdf_image::{StagedFile, check_writable};
+use anyhow::Context as _;
+use vdf_image::{StagedFile, check_distinct, check_writable};
 use vdf_lab::{
     LabError,
     queries::{QueryStream, ReplayOptions, record_queries},
@@ -22,7 +18,7 @@ use vdf_lab::{
 use vdf_render::{Integrator, PrepareOptions, PreparedScene, RenderOptions};
 use vdf_visibility::Method;
 
-use super::render::{integrator, load};
+use super::render::{Named, integrator, load};
 use crate::{
     args::{
         Methods, ReportCommand, ReportConvergenceArgs, ReportFiles, ReportQueriesArgs, ReportScalingArgs,
@@ -61,9 +57,11 @@ fn run_queries(args: &ReportQueriesArgs) -> Result<(), Failure> {
     let others = exported.iter().flatten().map(|path| ("--export", path.as_path()));
     args.files.check(&others.chain(args.queries.as_deref().map(|path| ("--queries", path))).collect::<Vec<_>>())?;
     let stream = args.queries.as_deref().map(QueryStream::read).transpose()?;
-    let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
-    recorded.validate(&scene)?;
-    warn(&scene.warnings);
+    let named = load(args.scene.as_deref(), &args.defines, None)?;
+    recorded.validate(&named.scene)?;
+    named.check_outputs(&args.files.outputs())?;
+    named.warn();
+    let Named { name, scene, .. } = named;
     args.files.report(|reporter| {
         let none = PrepareOptions { threads: args.threads, ..PrepareOptions::with_method(Method::NONE) };
         let prepared = PreparedScene::new(scene, &none, reporter)?;
@@ -95,9 +93,11 @@ fn run_convergence(args: &ReportConvergenceArgs) -> Result<(), Failure> {
         ..standard
     };
     options.validate()?;
-    let (name, scene) = load(args.scene.as_deref(), &args.defines)?;
+    let named = load(args.scene.as_deref(), &args.defines, None)?;
     args.files.check(&[])?;
-    warn(&scene.warnings);
+    named.check_outputs(&args.files.outputs())?;
+    named.warn();
+    let Named { name, scene, .. } = named;
     args.files.report(|reporter| convergence::run(&name, scene, &options, reporter))
 }
 
@@ -135,12 +135,6 @@ fn run_thesis(args: &ReportThesisArgs) -> Result<(), Failure> {
     args.files.report(|reporter| thesis::run(&options, reporter))
 }
 
-fn warn(warnings: &[String]) {
-    for warning in warnings {
-        say(format_args!("warning: {warning}"));
-    }
-}
-
 fn methods(choices: &[Methods]) -> Vec<Method> {
     let named = |choice: &Methods| match choice {
         Methods::All => Method::all().collect(),
@@ -163,22 +157,19 @@ fn integrators(names: &[Integrator], all_samples: &[u32]) -> Result<Vec<Integrat
 }
 
 impl ReportFiles {
-    fn named(&self) -> impl Iterator<Item = (&'static str, &Path)> {
+    fn named(&self) -> impl Iterator<Item = (&str, &Path)> {
         let all = [("--html", &self.html), ("--csv", &self.csv), ("--json", &self.json)];
         all.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)))
     }
 
-    /// Fails now rather than after an hour of measuring: if a file cannot be written, or would replace another of this run.
-    fn check(&self, others: &[(&str, &Path)]) -> Result<(), Failure> {
-        let mut taken: Vec<(&str, PathBuf)> = others.iter().map(|(option, path)| (*option, resolved(path))).collect();
-        for (option, path) in self.named() {
-            let file = resolved(path);
-            if let Some((other, _)) = taken.iter().find(|(_, taken)| *taken == file && !is_special(path)) {
-                let path = path.display();
-                return Err(Failure::Usage(anyhow!("{option} {path}: {other} is that file; give another name")));
-            }
-            taken.push((option, file));
-        }
+    fn outputs(&self) -> Vec<(&str, &Path)> {
+        self.named().collect()
+    }
+
+    /// Fails now rather than after an hour of measuring: if a file cannot be written, or would replace another that this run writes or reads.
+    fn check<'a>(&'a self, others: &[(&'a str, &'a Path)]) -> Result<(), Failure> {
+        let all: Vec<_> = others.iter().copied().chain(self.named()).collect();
+        check_distinct(&all, &[]).map_err(|conflict| Failure::Usage(conflict.into()))?;
         for (_, path) in self.named() {
             check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
         }
@@ -194,8 +185,9 @@ impl ReportFiles {
         if reporter.interrupted() {
             return Err(Failure::Interrupted);
         }
+        reporter.writes();
         report.provenance.set_command(env::args_os());
-        warn(&report.warnings);
+        report.warnings.iter().for_each(|warning| say(format_args!("warning: {warning}")));
         let mut staged = Vec::new();
         for (option, path) in self.named() {
             let content = match option {
@@ -215,18 +207,6 @@ impl ReportFiles {
         }
         Ok(())
     }
-}
-
-/// Where a file is or will be, by whatever links and detours its path leads there.
-fn resolved(path: &Path) -> PathBuf {
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let beside = || Some(absolute.parent()?.canonicalize().ok()?.join(absolute.file_name()?));
-    path.canonicalize().ok().or_else(beside).unwrap_or(absolute)
-}
-
-/// A device or a pipe keeps nothing that could be replaced.
-fn is_special(path: &Path) -> bool {
-    path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
 #[cfg(test)]

@@ -71,6 +71,7 @@ impl SceneFile<'_> {
 fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Result<(), Failure> {
     // It only listens for Ctrl-C: large files take a while, and an unfinished one must not stay behind.
     let reporter = Reporter::new(true)?;
+    reporter.writes();
     for (written, file) in files.enumerate() {
         let path = folder.join(file.path());
         let parent = path.parent().unwrap_or(folder);

@@ -10,25 +10,25 @@ use vdf_visibility::Method;
 use crate::{
     args::{Methods, VerifyArgs},
     commands::render::{load, write_json},
-    failure::{Failure, say},
+    failure::Failure,
     progress::Reporter,
 };
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<(), Failure> {
     let options = options(args);
     options.validate()?;
-    let (_, scene) = load(args.scene.as_deref(), &args.defines)?;
-    for warning in &scene.warnings {
-        say(format_args!("warning: {warning}"));
-    }
+    let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
+    named.warn();
     if let Some(path) = &args.stats {
+        named.check_outputs(&[("--stats", path)])?;
         check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
     }
 
     let reporter = Reporter::new(args.quiet)?;
-    let report = verify(scene, &options, &reporter);
+    let report = verify(named.scene, &options, &reporter);
     reporter.finish();
     let report = report?;
+    reporter.writes();
     if reporter.interrupted() {
         return Err(Failure::Interrupted);
     }
@@ -53,6 +53,7 @@ fn options(args: &VerifyArgs) -> VerifyOptions {
     VerifyOptions {
         methods,
         voxel_sizes: args.voxel_sizes.clone(),
+        grid: args.grid.into(),
         segments: args.segments,
         seed: args.seed,
         threads: args.threads,

@@ -12,22 +12,20 @@ use vdf_lab::SceneVoxels;
 use vdf_render::PrepareOptions;
 use vdf_voxel::{VoxelGrid, VoxelSet, write_indices, write_obj};
 
-use crate::{
-    args::VoxelizeArgs,
-    commands::render::load,
-    failure::{Failure, say},
-    progress::Reporter,
-};
+use crate::{args::VoxelizeArgs, commands::render::load, failure::Failure, progress::Reporter};
 
 pub(crate) fn run(args: &VoxelizeArgs) -> Result<(), Failure> {
-    let (_, scene) = load(args.scene.as_deref(), &args.defines)?;
-    for warning in &scene.warnings {
-        say(format_args!("warning: {warning}"));
-    }
+    let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
+    named.warn();
     let reporter = Reporter::new(true)?;
-    let options =
-        PrepareOptions { voxel_size: args.voxel, threads: args.threads, ..PrepareOptions::with_method(args.method) };
-    let voxels = SceneVoxels::build(scene, &options, &reporter)?;
+    let options = PrepareOptions {
+        voxel_size: args.voxel,
+        grid: args.grid.into(),
+        threads: args.threads,
+        ..PrepareOptions::with_method(args.method)
+    };
+    let voxels = SceneVoxels::build(named.scene, &options, &reporter)?;
+    reporter.writes();
 
     let mut written = Vec::new();
     if let Some(folder) = &args.export {
