@@ -74,7 +74,7 @@ impl World {
         let bounds = positions(scene).fold(matter, Bounds::with);
         Self {
             media: Media::of_scene(scene),
-            lights: Lights::new(scene, reach(scene, matter.extent().length())),
+            lights: Lights::new(scene, reach(scene, matter.extent().length(), bounds.extent().length())),
             far_plane_clips: scene.sensor.far_clip < matter.extent().length(),
             occluder_bounds: occluder_bounds(scene, &bvh, bounds),
             bvh,
@@ -158,8 +158,9 @@ pub fn light_shapes(scene: &Scene) -> Vec<LightShape<'_>> {
 
 /// A distance that leads out of the scene from anywhere in it, and, where fog is unbounded, through nearly all of it:
 /// beyond optical depth 800 nothing is left in double precision. It is limited to 10⁶ scenes, so that positions keep their precision.
-fn reach(scene: &Scene, diagonal: f64) -> f64 {
-    let diagonal = diagonal.max(f64::MIN_POSITIVE);
+/// `matter` is the diagonal of what rays can meet, `all` that of the scene with its lights.
+fn reach(scene: &Scene, matter: f64, all: f64) -> f64 {
+    let (matter, all) = (matter.max(f64::MIN_POSITIVE), all.max(f64::MIN_POSITIVE));
     let thinnest = scene.media.iter().map(|m| m.sigma_t).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min);
-    (800.0 / thinnest).clamp(2.0 * diagonal, 1e6 * diagonal)
+    (800.0 / thinnest).clamp(2.0 * matter, 1e6 * all)
 }

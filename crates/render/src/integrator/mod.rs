@@ -312,10 +312,10 @@ fn to_f32(x: f64) -> f32 {
     x as f32
 }
 
-/// The survival probability of a path after a surface, as in Mitsuba 3, or after very many events is at most this.
+/// The survival probability of a path is at most this where it might never end.
 const MAX_SURVIVAL: f32 = 0.95;
 
-/// So many events are far more than a path through bounded fog of any optical depth that can be waited for.
+/// So many events are more than all but a few paths take through bounded fog of optical depth 1000.
 const MANY_EVENTS: u32 = 1 << 16;
 
 /// Russian roulette: beyond `rr_depth` a path survives with the probability of its largest throughput.
@@ -325,12 +325,11 @@ const MANY_EVENTS: u32 = 1 << 16;
 /// too dark. A path in bounded fog leaves it, so there the bound is not needed; between white walls, and in fog without an end, it is.
 #[inline]
 fn survives(path: &mut Path, rr_depth: u32, sampler: &mut Sampler) -> bool {
-    let bounded = path.on_surface || path.depth > MANY_EVENTS;
-    // The bound ends a path whatever the scene asks for.
-    if path.depth <= rr_depth && path.depth <= MANY_EVENTS {
+    if path.depth <= rr_depth {
         return true;
     }
-    let q = path.throughput.max_element().min(if bounded { MAX_SURVIVAL } else { 1.0 });
+    let endless = path.on_surface || path.depth > MANY_EVENTS || path.ray.regions.is_empty();
+    let q = path.throughput.max_element().min(if endless { MAX_SURVIVAL } else { 1.0 });
     if sampler.next_1d() >= f64::from(q) {
         return false;
     }

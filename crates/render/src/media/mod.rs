@@ -8,6 +8,7 @@ mod extent;
 mod homogeneous;
 mod intervals;
 mod regions;
+mod shells;
 #[cfg(test)]
 mod tests;
 
@@ -51,11 +52,11 @@ pub enum FreeFlight {
 }
 
 impl Media {
-    /// Prepares media and boundaries, which have to be closed; `ambient` is the medium outside of all boundaries. Cost: that of a hierarchy
+    /// Prepares media and boundaries, which have to be closed, each alone or together; `ambient` is the medium outside of all boundaries. Cost: that of a hierarchy
     /// over the triangles of the boundaries.
     #[must_use]
     pub fn new(media: &[Medium], boundaries: &[Boundary], ambient: Option<MediumId>) -> Self {
-        let regions = Regions::new(boundaries, ambient);
+        let regions = Regions::new(media, boundaries, ambient);
         Self { media: media.iter().map(Homogeneous::from).collect(), regions, at_camera: RegionSet::default() }
     }
 

@@ -17,16 +17,17 @@
 //! *Cost.* A comparison of boxes for each boundary while there are few and none is met; else one query of a hierarchy. The winding number
 //! takes time in proportion to the boundary's triangles, on a null set of segments.
 //!
-//! *Limits.* Boundaries have to be closed; a scene file with an open one is refused.
+//! *Limits.* Boundaries have to be closed, each alone or together with others of the same medium (`shells.rs`); a scene file where they are not
+//! is refused.
 
 use std::ops::ControlFlow;
 
 use glam::DVec3;
 use smallvec::SmallVec;
 use vdf_geometry::{Bounds, Bvh, Segment, Triangle};
-use vdf_scene::{Boundary, MediumId};
+use vdf_scene::{Boundary, Medium, MediumId};
 
-use super::{MediumInterval, extent::Extent};
+use super::{MediumInterval, extent::Extent, shells::shells};
 
 /// The regions that a point is inside of, the innermost first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -39,6 +40,12 @@ impl RegionSet {
             (Ok(place), false) => drop(self.0.remove(place)),
             _ => {}
         }
+    }
+
+    /// True outside of all regions.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     fn contains(&self, region: u32) -> bool {
@@ -91,22 +98,18 @@ struct Crossing {
 type Crossings = SmallVec<[Crossing; 16]>;
 
 impl Regions {
-    pub(super) fn new(boundaries: &[Boundary], ambient: Option<MediumId>) -> Self {
+    pub(super) fn new(media: &[Medium], boundaries: &[Boundary], ambient: Option<MediumId>) -> Self {
+        let mut shells = shells(media, boundaries);
         // The least volume first; of equal ones the last in the file.
-        let mut order: Vec<(f64, usize)> =
-            boundaries.iter().enumerate().map(|(i, b)| (signed_volume(&b.triangles), i)).collect();
-        order.sort_by(|(a, i), (b, j)| a.abs().total_cmp(&b.abs()).then(j.cmp(i)));
+        shells.sort_by(|a, b| a.volume.total_cmp(&b.volume).then(b.place.cmp(&a.place)));
         let (mut triangles, mut faces, mut extents) = (Vec::new(), Vec::new(), Vec::new());
         let (mut inner, mut outer) = (Vec::new(), Vec::new());
-        for ((volume, i), region) in order.into_iter().zip(0..) {
-            let boundary = &boundaries[i];
-            let inwards = volume < 0.0;
-            let (inside, outside) = (boundary.interior, boundary.exterior);
-            inner.push(if inwards { outside } else { inside });
-            outer.push(if inwards { inside } else { outside });
-            extents.push(Extent::of(&boundary.triangles));
-            faces.extend(boundary.triangles.iter().map(|_| Face { region, inwards }));
-            triangles.extend_from_slice(&boundary.triangles);
+        for (shell, region) in shells.into_iter().zip(0..) {
+            inner.push(shell.inner);
+            outer.push(shell.outer);
+            extents.push(Extent::of(&shell.triangles));
+            faces.extend(shell.inwards.iter().map(|&inwards| Face { region, inwards }));
+            triangles.extend(shell.triangles);
         }
         let bvh = Bvh::new(&triangles);
         let crossing_tolerance = bvh.bounds().largest_coordinate() / (1_u64 << 40) as f64;
@@ -242,7 +245,12 @@ impl Regions {
     #[cold]
     fn winds_about(&self, region: u32, p: DVec3) -> bool {
         let of_region = self.faces.iter().zip(&self.triangles).filter(|(face, _)| face.region == region);
-        let half_angles: f64 = of_region.map(|(_, t)| half_solid_angle(t.vertices_f64().map(|v| v - p))).sum();
+        let half_angles: f64 = of_region
+            .map(|(face, t)| {
+                let half = half_solid_angle(t.vertices_f64().map(|v| v - p));
+                if face.inwards { -half } else { half }
+            })
+            .sum();
         half_angles.abs() > std::f64::consts::PI
     }
 
@@ -250,13 +258,6 @@ impl Regions {
     pub(super) fn is_one_box(&self) -> bool {
         self.only.is_some()
     }
-}
-
-/// The volume that closed triangles enclose, negative if their normals point inwards: a sum of signed tetrahedra.
-fn signed_volume(triangles: &[Triangle]) -> f64 {
-    let Bounds { min, max } = Bounds::of_triangles(triangles);
-    let centre = (min + max) * 0.5;
-    triangles.iter().map(|t| t.area_normal().dot(t.vertices_f64()[0] - centre) / 6.0).sum()
 }
 
 /// Half the signed solid angle of a triangle seen from the origin (van Oosterom and Strackee 1983).

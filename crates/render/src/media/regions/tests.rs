@@ -59,7 +59,7 @@ fn a_path_never_loses_count() {
             .enumerate()
     {
         let turn = turned(angle);
-        let regions = Regions::new(&cluster(turn, shift), None);
+        let regions = Regions::new(&[], &cluster(turn, shift), None);
         let clear = 4.0 * f64::from(f32::EPSILON) * (4.0 + shift.abs().max_element());
         let ulp = 2.0 * f64::EPSILON * (4.0 + shift.abs().max_element());
         for walk in 0..300 {
@@ -95,7 +95,7 @@ fn a_path_never_loses_count() {
 #[test]
 fn the_innermost_is_the_smallest_and_then_the_last() {
     let boxes = cluster(DMat3::IDENTITY, DVec3::ZERO);
-    let regions = Regions::new(&boxes, Some(MediumId(99)));
+    let regions = Regions::new(&[], &boxes, Some(MediumId(99)));
     let medium = |p: DVec3| regions.medium(&regions.at(p));
     assert_eq!(medium(dvec3(9.0, 0.0, 0.0)), Some(MediumId(99)));
     assert_eq!(medium(dvec3(-0.5, 0.0, 0.0)), Some(MediumId(5)));
@@ -110,7 +110,7 @@ fn the_innermost_is_the_smallest_and_then_the_last() {
 fn an_inward_boundary_is_turned_around() {
     let mut inward = cuboid(Vec3::ZERO, Vec3::ONE, DMat3::IDENTITY, DVec3::ZERO);
     inward.iter_mut().for_each(|t| t.vertices.swap(1, 2));
-    let regions = Regions::new(&[boundary(inward, 0)], Some(MediumId(0)));
+    let regions = Regions::new(&[], &[boundary(inward, 0)], Some(MediumId(0)));
     let (inside, outside) = (regions.at(DVec3::splat(0.5)), regions.at(DVec3::splat(1.5)));
     assert_eq!((regions.medium(&inside), regions.medium(&outside)), (None, Some(MediumId(0))));
     let out = Segment::new(DVec3::splat(0.5), dvec3(0.5, 0.6, 7.0));
@@ -125,7 +125,7 @@ fn many_boundaries_are_as_good_as_few() {
         let x = i as f32 * 3.0;
         boundary(cuboid(vec3(x, 0.0, 0.0), vec3(x + 1.0, 1.0, 1.0), DMat3::IDENTITY, DVec3::ZERO), i)
     };
-    let many = Regions::new(&(0..1000).map(puff).collect::<Vec<_>>(), None);
+    let many = Regions::new(&[], &(0..1000).map(puff).collect::<Vec<_>>(), None);
     for i in [0_u32, 7, 999] {
         let middle = dvec3(f64::from(i) * 3.0 + 0.5, 0.5, 0.5);
         let inside = many.at(middle);
@@ -145,4 +145,34 @@ fn many_boundaries_are_as_good_as_few() {
         ControlFlow::<()>::Continue(())
     });
     assert!(parts == 1000 && (length - 1000.0).abs() < 1e-4, "{parts} {length}");
+}
+
+/// Two open shells and the wall between them, which names the medium of either side: two regions; with equal media one.
+#[test]
+fn open_boundaries_close_together() {
+    use vdf_scene::{Phase, Rgb};
+    let cube = |x: f32| cuboid(vec3(x, 0.0, 0.0), vec3(x + 1.0, 1.0, 1.0), DMat3::IDENTITY, DVec3::ZERO);
+    let at_wall = |t: &Triangle| t.vertices.iter().all(|v| v.x == 1.0);
+    let (wall, left): (Vec<_>, Vec<_>) = cube(0.0).into_iter().partition(at_wall);
+    let right: Vec<_> = cube(1.0).into_iter().filter(|t| !at_wall(t)).collect();
+    let wall = Boundary { triangles: wall, interior: Some(MediumId(0)), exterior: Some(MediumId(1)) };
+    let boundaries = [boundary(left, 0), boundary(right, 1), wall];
+    let medium = |sigma_t| Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
+    for (media, expected) in [
+        ([medium(1.0), medium(2.0)], [Some(MediumId(0)), Some(MediumId(1))]),
+        ([medium(1.0); 2], [Some(MediumId(0)); 2]),
+    ] {
+        let regions = Regions::new(&media, &boundaries, None);
+        let s = Segment::new(dvec3(-1.0, 0.4, 0.4), dvec3(3.0, 0.5, 0.6));
+        let mut found = Vec::new();
+        let end = regions.walk(&s, &RegionSet::default(), |i, _| {
+            found.push(i.medium);
+            ControlFlow::<()>::Continue(())
+        });
+        found.dedup();
+        let mut wanted = vec![None, expected[0], expected[1], None];
+        wanted.dedup();
+        assert_eq!(found, wanted);
+        assert!(matches!(end, ControlFlow::Continue(set) if set == RegionSet::default()));
+    }
 }
