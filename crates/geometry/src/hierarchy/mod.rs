@@ -1,4 +1,4 @@
-//! The fallback: a bounding volume hierarchy (\[Ylitie2017, Meister2018\], built by obvhs) over exact triangle tests.
+//! The fallback: a bounding volume hierarchy (\[Wald2007, Meister2018, Ylitie2017\]) over exact triangle tests.
 //!
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test, so it
 //! never culls a triangle that the exact test would hit. So whether anything is hit, and by what, does not depend on
@@ -85,7 +85,9 @@ enum Approach {
 }
 
 impl Bvh {
-    /// Builds the hierarchy. Cost: O(n log n); about 1 µs a triangle.
+    /// Builds the hierarchy, on the threads of the current rayon pool; it is the same for any number of them. Cost: O(n
+    /// log n) for any input, about 0.6 µs a triangle and thread; 80 bytes a triangle while it builds, besides the
+    /// result.
     #[must_use]
     pub fn new(triangles: &[Triangle]) -> Self {
         let bounds = Bounds::of_triangles(triangles);

@@ -196,3 +196,103 @@ fn is_deep(branches: &[Branch]) -> bool {
     }
     false
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec4;
+
+    use super::*;
+
+    fn hull(min: Vec4, max: Vec4) -> Hull {
+        Hull { min, max }
+    }
+
+    /// A balanced tree over boxes in no order at all.
+    fn random_tree(leaves: u32) -> Vec<Branch> {
+        let mut noise = fastrand::Rng::with_seed(4);
+        let mut hulls: Vec<_> = (0..leaves)
+            .map(|_| {
+                let min = Vec4::new(noise.f32(), noise.f32(), noise.f32(), 0.0);
+                hull(min, min + noise.f32() * 0.1)
+            })
+            .map(|hull| Branch { hull, area: hull.area(), parent: 0, first: 0, leaf: 0 })
+            .collect();
+        hulls.iter_mut().zip(0..).for_each(|(branch, leaf)| branch.leaf = leaf);
+        // Pairs from the front to the back, level by level; the root comes last, so that all is turned around at the
+        // end.
+        let mut tree: Vec<Branch> = Vec::new();
+        let mut level = hulls;
+        while level.len() > 1 {
+            let start = low_bits(tree.len());
+            tree.extend(&level);
+            level = (0..low_bits(level.len() / 2))
+                .map(|i| {
+                    let hull = level[2 * i as usize].hull.union(level[2 * i as usize + 1].hull);
+                    Branch { hull, area: hull.area(), parent: 0, first: start + 2 * i, leaf: 0 }
+                })
+                .collect();
+        }
+        tree.extend(level);
+        let last = low_bits(tree.len() - 1);
+        tree.reverse();
+        for i in 0..tree.len() {
+            let first = tree[i].first;
+            // The branches with children come first.
+            if i + 1 < leaves as usize {
+                tree[i].first = last - first - 1;
+                for child in [tree[i].first, tree[i].first + 1] {
+                    tree[child as usize].parent = low_bits(i);
+                }
+            }
+        }
+        tree
+    }
+
+    /// The leaves of a tree whose boxes and links are right, and the surface of all its branches.
+    fn check(tree: &[Branch]) -> (Vec<u32>, f32) {
+        let (mut leaves, mut surface) = (Vec::new(), 0.0);
+        let mut pending = vec![0];
+        while let Some(i) = pending.pop() {
+            let branch = tree[i];
+            surface += branch.area;
+            assert_eq!(branch.area, branch.hull.area());
+            let first = branch.first as usize;
+            if first == 0 {
+                leaves.push(branch.leaf);
+                continue;
+            }
+            let union = tree[first].hull.union(tree[first + 1].hull);
+            assert!(union.min == branch.hull.min && union.max == branch.hull.max);
+            assert!(tree[first].parent as usize == i && tree[first + 1].parent as usize == i);
+            pending.extend([first, first + 1]);
+        }
+        leaves.sort_unstable();
+        (leaves, surface)
+    }
+
+    #[test]
+    fn a_cheaper_tree_with_the_same_leaves() {
+        let mut tree = random_tree(1024);
+        let (leaves, before) = check(&tree);
+        assert_eq!(leaves, (0..1024).collect::<Vec<_>>());
+        // Each time it moves a few of the largest.
+        let mut surface = before;
+        for _ in 0..30 {
+            reinsert(&mut tree);
+            let (same, after) = check(&tree);
+            assert!(same == leaves && after <= surface, "{surface} {after}");
+            surface = after;
+        }
+        assert!(surface < 0.95 * before, "{before} {surface}");
+    }
+
+    #[test]
+    fn small_trees_stay() {
+        for leaves in [1, 2, 4] {
+            let mut tree = random_tree(leaves);
+            let before = check(&tree);
+            reinsert(&mut tree);
+            assert_eq!(check(&tree).0, before.0);
+        }
+    }
+}
