@@ -1,18 +1,20 @@
 //! Building the tree: from the top, in parallel.
 //!
-//! *Idea:* a set of triangles is divided in two where the surface area heuristic says so. It looks at the planes between a few
-//! equal slices of the triangles' centres along each axis (binning, \[Wald2007\]). Which divisions make one node of eight
-//! children is a second question: the child with the largest surface is opened first. Sets of up to four triangles become a
-//! leaf, or several, whichever is cheapest of all possibilities.
+//! *Idea:* a set of triangles is divided in two where the surface area heuristic says so. It looks at the planes
+//! between a few equal slices of the triangles' centres along each axis (binning, \[Wald2007\]). Which divisions make
+//! one node of eight children is a second question: the child with the largest surface is opened first. Sets of up to
+//! four triangles become a leaf, or several, whichever is cheapest of all possibilities.
 //!
 //! *Guarantee:* the tree is the same for any number of threads. Slices are counted in parallel, but sums of counts and
 //! unions of boxes do not depend on their order, and all else depends on one set alone.
 //!
-//! *Cost:* O(n log n) time for every input; 32 bytes a triangle beside the tree. A set whose ancestors were divided too
-//! unevenly ([`UNEVEN`]) is divided in the middle. So no path is longer than 16 + log n / log 8⁄7, and
-//! each level looks at each triangle a fixed number of times. Equal centres are divided in the middle at once.
+//! *Cost:* O(n log n) time for every input. A set that more than [`UNEVEN`] uneven divisions led to is divided in the
+//! middle, and so are equal centres. So a path has no more than 17 + log n / log 8⁄7 divisions, and each looks at each
+//! of its triangles a fixed number of times. The upper branches are then moved, which takes bounded work
+//! ([`reinsert`]). While it is built the tree takes 32 bytes a triangle for the boxes and twice its nodes.
 //!
-//! *Limits:* as for [`layout`](super::layout). Where coordinates are not finite, so are boxes; the build ends all the same.
+//! *Limits:* as for [`layout`](super::layout). Where coordinates are not finite, so are boxes; the build ends all the
+//! same.
 
 use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
@@ -20,16 +22,14 @@ use smallvec::SmallVec;
 
 use super::{
     layout::{CHILDREN, Child, Leaf, NONE, Node, TOO_MANY, Tree, WIDTH},
+    reinsert::{Branch, reinsert},
     space::{TreeBox, TreeSpace},
 };
 use crate::Triangle;
 
-/// What a division costs a ray that comes into it, beside a leaf: a wide node takes the place of several. With more, two
-/// walls of a room become one leaf whose box is the room (`docs/performance.md`).
+/// What a division costs a ray that comes into it, beside a leaf: a wide node takes the place of several. With more,
+/// two walls of a room become one leaf whose box is the room (`docs/performance.md`).
 const NODE_COST: f32 = 0.3;
-
-/// Slices along each axis; a power of two.
-const SLICES: usize = 16;
 
 /// How many of the divisions above a set may leave more than seven eighths on one side. One more, and the set
 /// is divided in the middle.
@@ -37,6 +37,9 @@ const UNEVEN: u32 = 16;
 
 /// Sets up to this size are built by one thread.
 const ALONE: usize = 4096;
+
+/// The tree is divided into some tens of thousands of bunches of as many triangles, which are then arranged anew.
+const BUNCHES: usize = 1 << 14;
 
 /// Sets from this size on are looked at by several threads at once.
 const TOGETHER: usize = 1 << 16;
@@ -49,7 +52,8 @@ struct Item {
 }
 
 impl Item {
-    /// With this bit a number below 2²⁹ is that of a finite, normal float. So it may pass through arithmetic in the unused lane.
+    /// With this bit a number below 2²⁹ is that of a finite, normal float. So it may pass through arithmetic in the
+    /// unused lane.
     const NORMAL: u32 = 1 << 29;
 
     fn new(TreeBox { min, max }: TreeBox, number: u32) -> Self {
@@ -69,9 +73,9 @@ impl Item {
 
 /// A box while it grows; the fourth lane means nothing.
 #[derive(Clone, Copy)]
-struct Hull {
-    min: Vec4,
-    max: Vec4,
+pub(super) struct Hull {
+    pub(super) min: Vec4,
+    pub(super) max: Vec4,
 }
 
 impl Hull {
@@ -83,13 +87,13 @@ impl Hull {
     }
 
     #[inline(always)]
-    fn union(self, other: Self) -> Self {
+    pub(super) fn union(self, other: Self) -> Self {
         self.with(other.min, other.max)
     }
 
     /// Half the surface; 0 of nothing.
     #[inline(always)]
-    fn area(self) -> f32 {
+    pub(super) fn area(self) -> f32 {
         let e = (self.max - self.min).max(Vec4::ZERO);
         e.x * e.y + e.y * e.z + e.z * e.x
     }
@@ -120,45 +124,45 @@ fn gather<T: Copy + Send + Sync>(
     items.par_chunks(TOGETHER / 4).map(|part| part.iter().fold(start, &fold)).reduce(|| start, join)
 }
 
-/// Slices of the centres' hull along each axis: the box of the triangles in each, and their number.
+/// `N` slices of the centres' hull along each axis, a power of two: the box of the triangles in each, and their number.
 #[derive(Clone, Copy)]
-struct Slices {
-    hulls: [[Hull; SLICES]; 3],
-    counts: [[u32; SLICES]; 3],
+struct Slices<const N: usize> {
+    hulls: [[Hull; N]; 3],
+    counts: [[u32; N]; 3],
 }
 
-/// Which slice a centre is in.
+/// Which of `N` slices a centre is in.
 #[derive(Clone, Copy)]
-struct Slicing {
+struct Slicing<const N: usize> {
     lower: Vec4,
     /// Slices per unit.
     scale: Vec4,
 }
 
-impl Slicing {
+impl<const N: usize> Slicing<N> {
     #[allow(clippy::cast_precision_loss, reason = "a small number")]
     fn new(centres: Hull) -> Self {
         // Less than one slice more than there are; and no slices along an axis without extent.
         let extent = centres.max - centres.min;
-        let scale = Vec4::splat(SLICES as f32 - 0.01) / extent;
+        let scale = Vec4::splat(N as f32 - 0.01) / extent;
         let flat = !(extent.cmpgt(Vec4::ZERO) & scale.cmplt(Vec4::INFINITY));
         Self { lower: centres.min, scale: Vec4::select(flat, Vec4::ZERO, scale) }
     }
 
-    /// The slice along each axis. Adding 1.5·2²³ rounds to a whole number, which are then the last bits: no other conversion is
-    /// as cheap, and what is not a number stays within the slices.
+    /// The slice along each axis. Adding 1.5·2²³ rounds to a whole number, which are then the last bits: no other
+    /// conversion is as cheap, and what is not a number stays within the slices.
     #[inline(always)]
     fn slices(&self, centre: Vec4) -> [usize; 3] {
         let v = ((centre - self.lower) * self.scale - 0.5) + 12_582_912.0;
-        [v.x, v.y, v.z].map(|x| x.to_bits() as usize & (SLICES - 1))
+        [v.x, v.y, v.z].map(|x| x.to_bits() as usize & (N - 1))
     }
 }
 
-impl Slices {
-    const EMPTY: Self = Self { hulls: [[Hull::EMPTY; SLICES]; 3], counts: [[0; SLICES]; 3] };
+impl<const N: usize> Slices<N> {
+    const EMPTY: Self = Self { hulls: [[Hull::EMPTY; N]; 3], counts: [[0; N]; 3] };
 
     #[inline(always)]
-    fn add(&mut self, slicing: &Slicing, item: &Item) {
+    fn add(&mut self, slicing: &Slicing<N>, item: &Item) {
         for (axis, i) in slicing.slices(item.centre()).into_iter().enumerate() {
             self.hulls[axis][i] = self.hulls[axis][i].with(item.min, item.max);
             self.counts[axis][i] += 1;
@@ -167,7 +171,7 @@ impl Slices {
 
     fn union(mut self, other: &Self) -> Self {
         for axis in 0..3 {
-            for i in 0..SLICES {
+            for i in 0..N {
                 self.hulls[axis][i] = self.hulls[axis][i].union(other.hulls[axis][i]);
                 self.counts[axis][i] += other.counts[axis][i];
             }
@@ -177,7 +181,7 @@ impl Slices {
 
     /// Of these items.
     #[inline(never)]
-    fn of(items: &[Item], slicing: &Slicing) -> Self {
+    fn of(items: &[Item], slicing: &Slicing<N>) -> Self {
         let fold = |part: &[Item]| {
             let mut slices = Self::EMPTY;
             part.iter().for_each(|item| slices.add(slicing, item));
@@ -189,39 +193,29 @@ impl Slices {
         items.par_chunks(TOGETHER / 4).map(fold).reduce(|| Self::EMPTY, |a, b| a.union(&b))
     }
 
-    /// The axis, the last slice on the lower side, the hulls of both sides and how many are on the lower. `None` if all are in one slice.
+    /// The axis, the last slice on the lower side, and the hulls of both sides. `None` if all are in one slice.
     #[allow(clippy::cast_precision_loss, reason = "a cost")]
-    fn cheapest(&self) -> Option<(usize, usize, [Hull; 2], u32)> {
+    fn cheapest(&self) -> Option<(usize, usize, [Hull; 2])> {
         let mut best = (f32::INFINITY, None);
         for axis in 0..3 {
             let (hulls, counts) = (&self.hulls[axis], &self.counts[axis]);
-            let mut above = [(Hull::EMPTY, 0); SLICES];
+            let mut above = [(Hull::EMPTY, 0); N];
             let mut side = (Hull::EMPTY, 0);
-            for i in (1..SLICES).rev() {
+            for i in (1..N).rev() {
                 side = (side.0.union(hulls[i]), side.1 + counts[i]);
                 above[i - 1] = side;
             }
             let mut side = (Hull::EMPTY, 0);
-            for i in 0..SLICES - 1 {
+            for i in 0..N - 1 {
                 side = (side.0.union(hulls[i]), side.1 + counts[i]);
                 let cost = side.0.area() * side.1 as f32 + above[i].0.area() * above[i].1 as f32;
                 if side.1 > 0 && above[i].1 > 0 && cost < best.0 {
-                    best = (cost, Some((axis, i, [side.0, above[i].0], side.1)));
+                    best = (cost, Some((axis, i, [side.0, above[i].0])));
                 }
             }
         }
         best.1
     }
-}
-
-/// A set of triangles that is to become a part of the tree.
-struct Set<'a> {
-    items: &'a mut [Item],
-    hull: Hull,
-    /// How many divisions above were uneven.
-    uneven: u32,
-    /// How it is divided, if that is known.
-    division: Option<Box<Division>>,
 }
 
 /// How a large set was divided; its items are in that order.
@@ -232,15 +226,19 @@ struct Division {
     below: [Option<Box<Division>>; 2],
 }
 
-/// Divides a set in two: how many are on the lower side, which are moved to the front, and the hulls of both. At least two items.
+/// Divides a set in two: how many are on the lower side, which are moved to the front, and the hulls of both. At least
+/// two items.
 fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
     let centres = Hull::of_centres(items);
     if uneven <= UNEVEN {
-        let slicing = Slicing::new(centres);
-        if let Some((axis, last, hulls, count)) = Slices::of(items, &slicing).cheapest() {
-            let lower = partition(items, |item| slicing.slices(item.centre())[axis] <= last);
-            debug_assert_eq!(lower, count as usize);
-            return (lower, hulls);
+        // With few triangles the slices, not the triangles, take the time.
+        let cheapest = match items.len() {
+            ..=8 => divide_cheapest::<4>(items, centres),
+            9..=32 => divide_cheapest::<8>(items, centres),
+            _ => divide_cheapest::<16>(items, centres),
+        };
+        if let Some(division) = cheapest {
+            return division;
         }
     }
     // In the middle along the longest axis; equal centres in the order that they have.
@@ -256,23 +254,23 @@ fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
     (middle, [Hull::of(lower), Hull::of(upper)])
 }
 
-/// Moves the items that belong to the lower side to the front and counts them.
+/// The division between two of `N` slices that costs least. `None` if all centres are in one slice.
+fn divide_cheapest<const N: usize>(items: &mut [Item], centres: Hull) -> Option<(usize, [Hull; 2])> {
+    let slicing = Slicing::<N>::new(centres);
+    let (axis, last, hulls) = Slices::of(items, &slicing).cheapest()?;
+    Some((partition(items, |item| slicing.slices(item.centre())[axis] <= last), hulls))
+}
+
+/// Moves the items that belong to the lower side to the front and counts them. Without a branch, which would be guessed
+/// wrongly as often as not.
 fn partition(items: &mut [Item], is_lower: impl Fn(&Item) -> bool) -> usize {
-    let (mut from, mut to) = (0, items.len());
-    loop {
-        while from < to && is_lower(&items[from]) {
-            from += 1;
-        }
-        while from < to && !is_lower(&items[to - 1]) {
-            to -= 1;
-        }
-        if from >= to {
-            return from;
-        }
-        items.swap(from, to - 1);
-        from += 1;
-        to -= 1;
+    let mut lower = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        items.swap(i, lower);
+        lower += usize::from(is_lower(&item));
     }
+    lower
 }
 
 /// The count of uneven divisions below a division.
@@ -281,15 +279,17 @@ fn count_uneven(uneven: u32, lower: usize, all: usize) -> u32 {
 }
 
 /// Divides large sets in parallel, down to those that a thread builds alone.
-fn divide_large(items: &mut [Item], uneven: u32) -> Option<Box<Division>> {
-    if items.len() <= ALONE {
+fn divide_large(items: &mut [Item], uneven: u32, bunch: usize) -> Option<Box<Division>> {
+    if items.len() <= bunch {
         return None;
     }
+    let items_len = items.len();
     let (lower, hulls) = divide(items, uneven);
-    let uneven = count_uneven(uneven, lower, items.len());
+    let uneven = count_uneven(uneven, lower, items_len);
     let (a, b) = items.split_at_mut(lower);
-    let (a, b) = rayon::join(|| divide_large(a, uneven), || divide_large(b, uneven));
-    Some(Box::new(Division { lower, hulls, uneven, below: [a, b] }))
+    let (mut of_a, mut of_b) = (|| divide_large(a, uneven, bunch), || divide_large(b, uneven, bunch));
+    let (below_a, below_b) = if items_len > ALONE { rayon::join(of_a, of_b) } else { (of_a(), of_b()) };
+    Some(Box::new(Division { lower, hulls, uneven, below: [below_a, below_b] }))
 }
 
 /// The cheapest way to make leaves of up to four triangles.
@@ -297,7 +297,12 @@ struct FewLeaves {
     /// The cost of each subset (a bit for each item), in surfaces of leaves that a ray comes into.
     costs: [f32; 1 << WIDTH],
     /// The lower side of the cheapest division of each, 0 if it is a leaf.
-    divisions: [usize; 1 << WIDTH],
+    divisions: [u8; 1 << WIDTH],
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "there are four items")]
+fn bits(set: usize) -> u8 {
+    set as u8
 }
 
 impl FewLeaves {
@@ -317,7 +322,7 @@ impl FewLeaves {
                 if lower & rest == lower {
                     let cost = NODE_COST * area + few.costs[lower] + few.costs[set ^ lower];
                     if cost < area && cost < few.costs[set] {
-                        (few.costs[set], few.divisions[set]) = (cost, lower);
+                        (few.costs[set], few.divisions[set]) = (cost, bits(lower));
                     }
                 }
                 lower = (lower - 1) & set;
@@ -327,56 +332,186 @@ impl FewLeaves {
     }
 }
 
-impl<'a> Set<'a> {
-    /// Its two parts, or itself if it is a leaf.
-    fn open(self) -> Result<[Self; 2], Self> {
-        let Self { items, division, uneven, .. } = self;
-        let (lower, hulls, uneven, below) = if let Some(division) = division {
-            (division.lower, division.hulls, division.uneven, division.below)
-        } else if items.len() <= WIDTH {
-            let few = FewLeaves::new(items);
-            let all = (1 << items.len()) - 1;
-            let division = few.divisions[all];
-            if division == 0 {
-                return Err(Self { items, division: None, uneven, hull: self.hull });
-            }
-            let mut sorted: SmallVec<[Item; WIDTH]> = SmallVec::new();
-            sorted.extend((0..items.len()).filter(|i| division >> i & 1 == 1).map(|i| items[i]));
-            let lower = sorted.len();
-            sorted.extend((0..items.len()).filter(|i| division >> i & 1 == 0).map(|i| items[i]));
-            items.copy_from_slice(&sorted);
-            (lower, [Hull::of(&sorted[..lower]), Hull::of(&sorted[lower..])], uneven, [None, None])
-        } else {
-            let (lower, hulls) = divide(items, uneven);
-            (lower, hulls, count_uneven(uneven, lower, items.len()), [None, None])
-        };
-        let (a, b) = items.split_at_mut(lower);
-        let [of_a, of_b] = below;
-        Ok([
-            Self { items: a, hull: hulls[0], uneven, division: of_a },
-            Self { items: b, hull: hulls[1], uneven, division: of_b },
-        ])
-    }
+/// A set of triangles that is divided only when it is built.
+struct Bunch<'a> {
+    items: &'a mut [Item],
+    hull: Hull,
+    /// How many divisions above were uneven.
+    uneven: u32,
+}
 
-    /// Up to eight parts: the children of a node. One if it is a leaf.
-    fn children(self) -> SmallVec<[(Self, bool); CHILDREN]> {
-        // With each whether it is known to be a leaf.
-        let mut children: SmallVec<[(Self, bool); CHILDREN]> = SmallVec::new();
-        children.push((self, false));
-        while children.len() < CHILDREN {
-            let open = (0..children.len()).filter(|&i| !children[i].1);
-            let area = |i: usize| children[i].0.hull.area();
-            let Some(i) = open.max_by(|&i, &j| area(i).total_cmp(&area(j))) else { break };
-            match children.swap_remove(i).0.open() {
-                Ok(parts) => children.extend(parts.map(|part| {
-                    let single = part.items.len() == 1;
-                    (part, single)
-                })),
-                Err(leaf) => children.push((leaf, true)),
+/// The upper part of the binary tree, down to sets of a few triangles.
+struct Top {
+    branches: Vec<Branch>,
+    /// How many bunches are below each branch, and how many triangles.
+    below: Vec<(usize, usize)>,
+}
+
+impl Top {
+    /// The tree of these divisions, made cheaper, and its bunches in the order of the tree.
+    fn new(items: &mut [Item], hull: Hull, division: Option<Box<Division>>) -> (Self, Vec<Bunch<'_>>) {
+        let mut branches = Vec::new();
+        let mut bunches = Vec::new();
+        let branch = |hull: Hull, parent| Branch { hull, area: hull.area(), parent, first: 0, leaf: 0 };
+        branches.push(branch(hull, 0));
+        let mut pending = vec![(0, items, division, 0)];
+        while let Some((i, items, division, uneven)) = pending.pop() {
+            if let Some(division) = division {
+                let Division { lower, hulls, uneven, below: [below_a, below_b] } = *division;
+                let first = branches.len();
+                branches[i].first = low_bits(first);
+                branches.extend(hulls.map(|hull| branch(hull, low_bits(i))));
+                let (a, b) = items.split_at_mut(lower);
+                pending.extend([(first + 1, b, below_b, uneven), (first, a, below_a, uneven)]);
+            } else {
+                branches[i].leaf = low_bits(bunches.len());
+                bunches.push(Some(Bunch { items, hull: branches[i].hull, uneven }));
             }
         }
-        children
+        reinsert(&mut branches);
+        // Parents first, so that the children of each are known when it is looked at from behind.
+        let mut order = Vec::with_capacity(branches.len());
+        let mut sorted = Vec::with_capacity(bunches.len());
+        let mut below = vec![(0, 0); branches.len()];
+        let mut pending = vec![0];
+        while let Some(i) = pending.pop() {
+            order.push(i);
+            let Branch { first, leaf, .. } = branches[i];
+            if first != 0 {
+                pending.extend([first as usize + 1, first as usize]);
+            } else if let Some(bunch) = bunches[leaf as usize].take() {
+                below[i] = (1, bunch.items.len());
+                sorted.push(bunch);
+            }
+        }
+        for i in order.into_iter().rev() {
+            let first = branches[i].first as usize;
+            if first != 0 {
+                below[i] = (below[first].0 + below[first + 1].0, below[first].1 + below[first + 1].1);
+            }
+        }
+        (Self { branches, below }, sorted)
     }
+
+    /// The set below a branch with these bunches.
+    fn set<'a, 'b>(&self, branch: usize, bunches: &'a mut [Bunch<'b>]) -> Set<'a, 'b> {
+        let hull = self.branches[branch].hull;
+        match bunches {
+            [Bunch { items, uneven, .. }] => Set::Bunch(Bunch { items: std::mem::take(items), hull, uneven: *uneven }),
+            _ if self.below[branch].1 <= WIDTH => {
+                Set::Few(bunches.iter().flat_map(|bunch| bunch.items.iter().copied()).collect(), hull)
+            }
+            _ => Set::Branch(branch, bunches, hull),
+        }
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "there are less than 2^32 branches")]
+fn low_bits(i: usize) -> u32 {
+    i as u32
+}
+
+/// The numbers of a leaf's triangles, and how many there are.
+#[derive(Clone, Copy)]
+struct Numbers([u32; WIDTH], usize);
+
+/// A set of triangles that is to become a part of the tree.
+enum Set<'a, 'b> {
+    /// A branch of the top with its bunches: more than one, and more triangles than a leaf has.
+    Branch(usize, &'a mut [Bunch<'b>], Hull),
+    Bunch(Bunch<'b>),
+    /// Triangles of several bunches, no more than a leaf has.
+    Few(Vec<Item>, Hull),
+    Leaf(Numbers, Hull),
+}
+
+impl Set<'_, '_> {
+    fn hull(&self) -> Hull {
+        match self {
+            Set::Branch(_, _, hull) | Set::Bunch(Bunch { hull, .. }) | Set::Few(_, hull) | Set::Leaf(_, hull) => *hull,
+        }
+    }
+
+    /// How many triangles there are.
+    fn len(&self, top: &Top) -> usize {
+        match self {
+            Set::Branch(i, ..) => top.below[*i].1,
+            Set::Bunch(bunch) => bunch.items.len(),
+            Set::Few(items, _) => items.len(),
+            Set::Leaf(numbers, _) => numbers.1,
+        }
+    }
+
+    /// Its two parts, or its triangles if it is a leaf.
+    fn open(self, top: &Top) -> Result<[Self; 2], Numbers> {
+        match self {
+            Set::Branch(i, bunches, _) => {
+                let first = top.branches[i].first as usize;
+                let (a, b) = bunches.split_at_mut(top.below[first].0);
+                Ok([top.set(first, a), top.set(first + 1, b)])
+            }
+            Set::Bunch(Bunch { items, hull, uneven }) => {
+                let (lower, hulls, uneven) = if items.len() > WIDTH {
+                    let (lower, hulls) = divide(items, uneven);
+                    (lower, hulls, count_uneven(uneven, lower, items.len()))
+                } else {
+                    let (lower, hulls) = divide_few(items, hull).ok_or_else(|| numbers(items))?;
+                    (lower, hulls, uneven)
+                };
+                let (a, b) = items.split_at_mut(lower);
+                let [of_a, of_b] = hulls;
+                let part = |items, hull| Set::Bunch(Bunch { items, hull, uneven });
+                Ok([part(a, of_a), part(b, of_b)])
+            }
+            Set::Few(mut items, hull) => {
+                let (lower, [a, b]) = divide_few(&mut items, hull).ok_or_else(|| numbers(&items))?;
+                let upper = items.split_off(lower);
+                Ok([Set::Few(items, a), Set::Few(upper, b)])
+            }
+            Set::Leaf(numbers, _) => Err(numbers),
+        }
+    }
+
+    /// Up to eight parts, the children of a node; or the triangles of a leaf.
+    fn children(self, top: &Top) -> Result<SmallVec<[Self; CHILDREN]>, Numbers> {
+        let mut children: SmallVec<[Self; CHILDREN]> = SmallVec::from_iter(self.open(top)?);
+        while children.len() < CHILDREN {
+            let open = (0..children.len()).filter(|&i| !matches!(children[i], Set::Leaf(..)));
+            let area = |i: usize| children[i].hull().area();
+            let Some(i) = open.max_by(|&i, &j| area(i).total_cmp(&area(j))) else { break };
+            let hull = children[i].hull();
+            match std::mem::replace(&mut children[i], Set::Few(Vec::new(), hull)).open(top) {
+                Ok([a, b]) => {
+                    children[i] = a;
+                    children.push(b);
+                }
+                Err(leaf) => children[i] = Set::Leaf(leaf, hull),
+            }
+        }
+        Ok(children)
+    }
+}
+
+/// Divides up to four triangles in two where that is cheaper than a leaf.
+fn divide_few(items: &mut [Item], hull: Hull) -> Option<(usize, [Hull; 2])> {
+    let n = items.len();
+    let side = |bits: usize, bit: usize| (0..n).filter(move |i| bits >> i & 1 == bit);
+    let lower = match n {
+        ..=1 => 0,
+        // Two are common, and have one division only.
+        2 => {
+            let [a, b] = [&items[..1], &items[1..]].map(|items| Hull::of(items).area());
+            usize::from(NODE_COST * hull.area() + a + b < hull.area())
+        }
+        _ => usize::from(FewLeaves::new(items).divisions[(1 << n) - 1]),
+    };
+    if lower == 0 {
+        return None;
+    }
+    let sorted: SmallVec<[Item; WIDTH]> = side(lower, 1).chain(side(lower, 0)).map(|i| items[i]).collect();
+    items.copy_from_slice(&sorted);
+    let lower = side(lower, 1).count();
+    Some((lower, [Hull::of(&items[..lower]), Hull::of(&items[lower..])]))
 }
 
 /// A part of the tree, numbered by itself.
@@ -388,37 +523,39 @@ struct Part {
 }
 
 impl Part {
-    /// Adds all that is below a set. Depth first, so that what is near in space is near in memory, and without recursion.
-    fn add(&mut self, set: Set<'_>) -> Child {
-        let mut root = None;
+    /// Adds all that is below a set. Depth first, so that what is near in space is near in memory, and without
+    /// recursion.
+    fn add(&mut self, set: Set<'_, '_>, top: &Top) -> Child {
+        let mut root = Child::node(0);
         let mut pending = vec![(set, None)];
         while let Some((set, place)) = pending.pop() {
-            let children = set.children();
-            let child = if let [(leaf, _)] = &children[..] {
-                self.leaves.push(numbers(leaf.items));
-                Child::leaf(self.leaves.len() - 1, leaf.items.len())
-            } else {
-                let index = self.nodes.len();
-                self.nodes.push(Node::new(children.iter().map(|(child, _)| child.hull.tree_box())));
-                pending.extend(children.into_iter().enumerate().rev().map(|(i, (child, _))| (child, Some((index, i)))));
-                Child::node(index)
+            let child = match set.children(top) {
+                Err(Numbers(numbers, count)) => {
+                    self.leaves.push(numbers);
+                    Child::leaf(self.leaves.len() - 1, count)
+                }
+                Ok(children) => {
+                    let index = self.nodes.len();
+                    self.nodes.push(Node::new(children.iter().map(|child| child.hull().tree_box())));
+                    pending.extend(children.into_iter().enumerate().rev().map(|(i, child)| (child, Some((index, i)))));
+                    Child::node(index)
+                }
             };
             match place {
-                None => root = Some(child),
+                None => root = child,
                 Some((parent, i)) => self.nodes[parent].children[i] = child,
             }
         }
-        root.unwrap_or(Child::node(0))
+        root
     }
 }
 
-/// The numbers of a leaf's triangles.
-fn numbers(items: &[Item]) -> [u32; WIDTH] {
+fn numbers(items: &[Item]) -> Numbers {
     let mut numbers = [NONE; WIDTH];
     for (number, item) in numbers.iter_mut().zip(items) {
         *number = item.number();
     }
-    numbers
+    Numbers(numbers, items.len().min(WIDTH))
 }
 
 /// The upper part of the tree.
@@ -428,16 +565,23 @@ enum Limb {
 }
 
 /// All that is below a set, in parallel.
-fn grow(set: Set<'_>) -> Limb {
-    if set.items.len() <= ALONE {
-        let mut part = Part::default();
-        let root = part.add(set);
+fn grow(set: Set<'_, '_>, top: &Top) -> Limb {
+    let mut part = Part::default();
+    if set.len(top) <= ALONE {
+        let root = part.add(set, top);
         return Limb::Part(part, root);
     }
-    let children = set.children();
-    let node = Node::new(children.iter().map(|(child, _)| child.hull.tree_box()));
-    let children: Vec<_> = children.into_iter().collect();
-    Limb::Node(Box::new(node), children.into_par_iter().map(|(child, _)| grow(child)).collect())
+    match set.children(top) {
+        Ok(children) => {
+            let node = Node::new(children.iter().map(|child| child.hull().tree_box()));
+            let children: Vec<_> = children.into_iter().collect();
+            Limb::Node(Box::new(node), children.into_par_iter().map(|child| grow(child, top)).collect())
+        }
+        Err(Numbers(numbers, count)) => {
+            part.leaves.push(numbers);
+            Limb::Part(part, Child::leaf(0, count))
+        }
+    }
 }
 
 /// Nodes that get their places in the tree.
@@ -507,8 +651,11 @@ impl Tree {
         let item = |(i, triangle): (usize, &Triangle)| Item::new(space.padded_box(triangle), i as u32);
         let mut items: Vec<Item> = triangles.par_iter().enumerate().map(item).collect();
         let hull = Hull::of(&items);
-        let division = divide_large(&mut items, 0);
-        let limb = grow(Set { items: &mut items, hull, uneven: 0, division });
+        let bunch = items.len() / BUNCHES;
+        let division = divide_large(&mut items, 0, bunch.max(1));
+        let (top, mut bunches) = Top::new(&mut items, hull, division);
+        let limb = grow(top.set(0, &mut bunches), &top);
+        drop(bunches);
         drop(items);
         let mut pieces = Pieces::default();
         let root = Some(pieces.add(limb));
@@ -523,4 +670,140 @@ impl Tree {
 /// The numbers that are those of triangles.
 fn used(numbers: &[u32; WIDTH]) -> &[u32] {
     &numbers[..numbers.iter().take_while(|&&number| number != NONE).count()]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use glam::Vec3;
+
+    use super::*;
+    use crate::Bounds;
+
+    fn build(triangles: &[Triangle]) -> Tree {
+        Tree::build(triangles, TreeSpace::new(&Bounds::of_triangles(triangles)))
+    }
+
+    fn number(i: usize) -> f32 {
+        f32::from(u16::try_from(i % 60_000).unwrap_or(0))
+    }
+
+    /// Inputs that ruin one builder or another.
+    fn hard(n: usize) -> Vec<(&'static str, Vec<Triangle>)> {
+        let mut noise = fastrand::Rng::with_seed(9);
+        let mut point = |size: f32| Vec3::new(noise.f32() - 0.5, noise.f32() - 0.5, noise.f32() - 0.5) * size;
+        let rim = |i: usize| {
+            let angle = number(i) * 1e-4;
+            Vec3::new(angle.cos(), angle.sin(), 0.3 * (3.0 * angle).sin())
+        };
+        let corners = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.3), Vec3::new(0.0, 1.0, 0.5)];
+        let of =
+            |f: &mut dyn FnMut(usize) -> [Vec3; 3]| -> Vec<_> { (0..n).map(|i| Triangle { vertices: f(i) }).collect() };
+        vec![
+            ("equal", of(&mut |_| corners)),
+            ("fan", of(&mut |i| [Vec3::ZERO, rim(i), rim(i + 1)])),
+            ("nested", of(&mut |i| corners.map(|v| v * (1.0 + number(i) * 1e-3)))),
+            ("nested by powers", of(&mut |i| corners.map(|v| v * 0.999_f32.powf(number(i))))),
+            (
+                "equal centres",
+                of(&mut |_| {
+                    let [a, b] = [point(1.0), point(1.0)];
+                    [a, b, -(a + b)]
+                }),
+            ),
+            ("on a line", of(&mut |i| [Vec3::X, Vec3::X * 2.0, Vec3::Y].map(|v| v + Vec3::X * number(i)))),
+            (
+                "huge and tiny",
+                of(&mut |i| {
+                    let size = 10.0_f32.powf(30.0 - number(i) / number(n - 1) * 60.0);
+                    [point(size), point(size), point(size)]
+                }),
+            ),
+            ("without extent", of(&mut |_| [Vec3::ONE; 3])),
+            ("not finite", of(&mut |i| [point(1.0), point(1.0), Vec3::splat([f32::NAN, f32::INFINITY, 1.0][i % 3])])),
+        ]
+    }
+
+    /// The depth of the tree, and whether its boxes hold what is below them.
+    fn depth(tree: &Tree, triangles: &[Triangle], space: TreeSpace) -> usize {
+        let mut seen = vec![false; triangles.len()];
+        let mut deepest = 0;
+        let everything = TreeBox { min: Vec3A::NEG_INFINITY, max: Vec3A::INFINITY };
+        let mut pending: Vec<_> = tree.root.into_iter().map(|root| (root, everything, 1)).collect();
+        while let Some((child, bounds, depth)) = pending.pop() {
+            deepest = deepest.max(depth);
+            let holds = |b: TreeBox| !b.min.cmplt(bounds.min).any() && !b.max.cmpgt(bounds.max).any();
+            if child.triangles() > 0 {
+                let leaf = &tree.leaves[child.index()];
+                for &number in &leaf.numbers[..child.triangles() as usize] {
+                    assert!(!std::mem::replace(&mut seen[number as usize], true), "twice: {number}");
+                    assert!(holds(space.padded_box(&triangles[number as usize])) || !bounds.min.is_finite());
+                }
+                continue;
+            }
+            let node = &tree.nodes[child.index()];
+            for (i, &child) in node.children.iter().enumerate() {
+                let side = |upper: usize| {
+                    Vec3A::from_array([0, 1, 2].map(|axis| node.planes[axis][upper][i / WIDTH][i % WIDTH]))
+                };
+                let inner = TreeBox { min: side(0), max: side(1) };
+                if inner.min.cmpgt(inner.max).all() {
+                    continue;
+                }
+                assert!(holds(inner));
+                pending.push((child, inner, depth + 1));
+            }
+        }
+        assert!(seen.iter().all(|&seen| seen));
+        deepest
+    }
+
+    /// No input makes a deep tree or takes long: of a hundred thousand triangles a tenth of a second, with a wide
+    /// margin here for busy machines. (One after the other, obvhs took 26 s for the fan.)
+    #[test]
+    fn hard_inputs_take_neither_long_nor_deep_trees() {
+        for (name, triangles) in hard(60_000).into_iter().chain([("none", vec![]), ("one", vec![hard(1)[0].1[0]])]) {
+            let start = Instant::now();
+            let tree = build(&triangles);
+            assert!(start.elapsed() < Duration::from_secs(6), "{name}: {:?}", start.elapsed());
+            if name != "not finite" {
+                let depth = depth(&tree, &triangles, TreeSpace::new(&Bounds::of_triangles(&triangles)));
+                assert!(depth <= 40, "{name}: {depth}");
+            }
+        }
+        assert!(build(&vec![hard(1)[0].1[0]; 1_000_000]).nodes.len() < 200_000);
+    }
+
+    #[test]
+    fn the_tree_does_not_depend_on_the_number_of_threads() {
+        let mut noise = fastrand::Rng::with_seed(2);
+        let mut point = |size: f32| Vec3::new(noise.f32(), noise.f32(), noise.f32()) * size;
+        let mut inputs = hard(10_000);
+        let scattered = (0..150_000).map(|_| (point(1.0), point(0.02), point(0.02)));
+        inputs.push(("scattered", scattered.map(|(o, a, b)| Triangle::new(o, o + a, o + b)).collect()));
+        for (name, triangles) in inputs {
+            let trees = [1, 2, 5].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let tree = pool.install(|| build(&triangles));
+                let nodes = tree.nodes.iter().map(|node| {
+                    (
+                        node.planes.map(|p| p.map(|p| p.map(|v| v.to_array()))),
+                        node.children.map(|c| (c.index(), c.triangles())),
+                    )
+                });
+                let nodes: Vec<_> = nodes.collect();
+                (format!("{nodes:?}"), tree.leaves.iter().map(|leaf| leaf.numbers).collect::<Vec<_>>())
+            });
+            assert!(trees[0] == trees[1] && trees[0] == trees[2], "{name}");
+        }
+    }
+
+    #[test]
+    fn few_triangles_become_the_cheapest_leaves() {
+        let flat = |z: f32| Triangle::new(Vec3::Z * z, Vec3::X + Vec3::Z * z, Vec3::Y + Vec3::Z * z);
+        // Two pairs far apart are two leaves, four together are one.
+        assert_eq!(build(&[flat(0.0), flat(9.0), flat(0.01), flat(9.01)]).leaves.len(), 2);
+        assert_eq!(build(&[flat(0.0), flat(0.02), flat(0.01), flat(0.03)]).leaves.len(), 1);
+    }
 }

@@ -1,4 +1,4 @@
-//! The fallback: a bounding volume hierarchy (\[Ylitie2017, Meister2018\], built by obvhs) over exact triangle tests.
+//! The fallback: a bounding volume hierarchy (\[Wald2007, Meister2018, Ylitie2017\]) over exact triangle tests.
 //!
 //! The hierarchy only culls. Its boxes are single precision and padded by more than all rounding of its box test, so it
 //! never culls a triangle that the exact test would hit. So whether anything is hit, and by what, does not depend on
@@ -6,9 +6,9 @@
 //!
 //! *Which hit is the first* does not depend on it either. The first is that with the least (t, number) of all hits,
 //! where t is what [`SegmentTest::intersect`] computes: a function of the segment, the triangle and the bounds of the
-//! scene. The rounding of t is large for grazing slivers, so no triangle whose t is the least may be culled. Here is why
-//! it is not. (The place of t is its distance along the segment's largest component; lengths are in units of 2⁻²⁴ of
-//! the tree's space.) Let a ray end at a hit with parameter t₀, and let a triangle be hit at t ≤ t₀ as computed.
+//! scene. The rounding of t is large for grazing slivers, so no triangle whose t is the least may be culled. Here is
+//! why it is not. (The place of t is its distance along the segment's largest component; lengths are in units of 2⁻²⁴
+//! of the tree's space.) Let a ray end at a hit with parameter t₀, and let a triangle be hit at t ≤ t₀ as computed.
 //!
 //! 1. Boxes are culled only if the ray comes in beyond `end(t₀)`, which is at least `end(t)`. That is at least 48
 //!    beyond the place of t: 64 by the pad, less the rounding to single precision and of the start.
@@ -28,6 +28,7 @@
 mod build;
 mod layout;
 mod leaf;
+mod reinsert;
 mod space;
 mod traverse;
 
@@ -84,7 +85,9 @@ enum Approach {
 }
 
 impl Bvh {
-    /// Builds the hierarchy. Cost: O(n log n); about 1 µs a triangle.
+    /// Builds the hierarchy, on the threads of the current rayon pool; it is the same for any number of them. Cost: O(n
+    /// log n) for any input, about 0.6 µs a triangle and thread; 80 bytes a triangle while it builds, besides the
+    /// result.
     #[must_use]
     pub fn new(triangles: &[Triangle]) -> Self {
         let bounds = Bounds::of_triangles(triangles);
