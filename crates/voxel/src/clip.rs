@@ -35,6 +35,17 @@ impl VoxelGrid {
         }
     }
 
+    /// The voxel where the segment from `outside` to `inside`, a point of the grid, enters the grid, found by rounding outwards: along each axis
+    /// the part of the segment in the grid lies between this voxel and that of `inside`. `None` if a coordinate is not finite or too large for that.
+    #[must_use]
+    pub fn entry_voxel(&self, outside: DVec3, inside: DVec3) -> Option<Voxel> {
+        let (GridPoint(from), GridPoint(to)) = (self.grid_coordinates(outside), self.grid_coordinates(inside));
+        match self.voxel_span(outside, inside) {
+            Span::Inside(entry, _) if can_be_clipped(from) && can_be_clipped(to) => Some(entry),
+            _ => None,
+        }
+    }
+
     #[inline(never)]
     fn clipped_span(&self, a: DVec3, b: DVec3) -> Span {
         // One direction only, so that both directions round alike.
@@ -50,11 +61,10 @@ impl VoxelGrid {
     fn span_of(&self, GridPoint(ga): GridPoint, GridPoint(gb): GridPoint) -> Span {
         let resolution = self.resolution();
         let box_max = DVec3::new(resolution.x().into(), resolution.y().into(), resolution.z().into());
-        let reach = ga.abs().max(gb.abs()).max(box_max).max_element();
-        // `max` drops NaN, so both ends are asked as well.
-        if !(ga.is_finite() && gb.is_finite() && reach < 1e200) {
+        if !(can_be_clipped(ga) && can_be_clipped(gb)) {
             return Span::Inside(Voxel::new(0, 0, 0), resolution.last());
         }
+        let reach = ga.abs().max(gb.abs()).max(box_max).max_element();
         let margin = 64.0 * f64::EPSILON * reach;
         let d = gb - ga;
 
@@ -85,6 +95,11 @@ impl VoxelGrid {
         // Truncation clamps to the grid: conversion of negative numbers gives 0.
         Span::Inside(self.truncated(GridPoint(from)), self.truncated(GridPoint(to)))
     }
+}
+
+/// Whether clipping a segment with this end is exact enough: beyond, and for what is not a number, it would overflow.
+fn can_be_clipped(end: DVec3) -> bool {
+    end.is_finite() && end.abs().max_element() < 1e200
 }
 
 #[cfg(test)]

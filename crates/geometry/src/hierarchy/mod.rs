@@ -29,6 +29,7 @@ mod build;
 mod layout;
 mod leaf;
 mod reinsert;
+mod slices;
 mod space;
 mod traverse;
 

@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 
-use super::build::Hull;
+use super::slices::Hull;
 
 /// A node of a binary tree. Children lie side by side, at odd places and the even ones behind them; the root is at 0.
 #[derive(Clone, Copy)]

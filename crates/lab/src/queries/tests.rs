@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use vdf_render::{Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions};
+use vdf_render::{GridExtent, Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions};
 use vdf_scene::{Emitter, LoadOptions, Scene};
 use vdf_scenes::builtin;
 use vdf_visibility::{Method, QueryKind};
@@ -155,8 +155,13 @@ fn a_damaged_file_is_refused() {
 fn a_replay_measures_all_methods() {
     let prepared = plain("cbox_vol2", "12");
     let stream = record_queries(&prepared, &options(RAYMARCH, 2), 5000, &Quiet).unwrap();
-    let options =
-        ReplayOptions { voxel_sizes: vec![16.0, 40.0], passes: 2, threads: Some(2), ..ReplayOptions::default() };
+    let options = ReplayOptions {
+        voxel_sizes: vec![16.0, 40.0],
+        grid: GridExtent::Scene,
+        passes: 2,
+        threads: Some(2),
+        ..ReplayOptions::default()
+    };
     let r = replay(&prepared, &stream, &options, &Quiet).unwrap();
     let classes: Vec<_> = r.hierarchy.classes.iter().map(|c| (c.kind, c.queries)).collect();
     let superficial = stream.queries.len() - stream.spatial();

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use vdf_distfield::Neighbourhood;
-use vdf_voxel::{Span, VoxelGrid, VoxelSet};
+use vdf_voxel::{VoxelGrid, VoxelSet};
 
 use super::{Answer, DistanceField, FieldProver, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
@@ -15,10 +15,7 @@ fn by_neighbourhood<N: Neighbourhood>(grid: &VoxelGrid, neighbourhood: &N, from:
     if let Some(voxel) = grid.voxel_containing(from) {
         return Answer::unoccluded_if(neighbourhood.proves(voxel));
     }
-    Answer::unoccluded_if(match grid.voxel_span(from, to) {
-        Span::Outside => true,
-        Span::Inside(entry, _) => neighbourhood.proves(entry),
-    })
+    Answer::unoccluded_if(grid.entry_voxel(from, to).is_some_and(|entry| neighbourhood.proves(entry)))
 }
 
 /// What a method built for a scene.

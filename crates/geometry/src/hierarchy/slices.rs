@@ -1,0 +1,269 @@
+//! Dividing a set of triangles in two: by the cheapest plane between equal slices of their centres (binning, \[Wald2007\]).
+//!
+//! *Guarantee:* sums of counts and unions of boxes do not depend on their order, so a division does not depend on threads.
+//!
+//! *Cost:* each triangle is looked at a fixed number of times. A set that more than [`UNEVEN`] uneven divisions led to is divided in the
+//! middle, and so are equal centres.
+
+use glam::{Vec3A, Vec4};
+use rayon::prelude::*;
+
+use super::space::TreeBox;
+
+/// How many of the divisions above a set may leave more than seven eighths on one side. One more, and the set
+/// is divided in the middle.
+pub(super) const UNEVEN: u32 = 16;
+
+/// Sets up to this size are built by one thread.
+pub(super) const ALONE: usize = 4096;
+
+/// Sets from this size on are looked at by several threads at once.
+const TOGETHER: usize = 1 << 16;
+
+/// A triangle's padded box and its number. The number is in `max.w`, see [`Item::new`].
+#[derive(Clone, Copy)]
+pub(super) struct Item {
+    pub(super) min: Vec4,
+    pub(super) max: Vec4,
+}
+
+impl Item {
+    /// With this bit a number below 2²⁹ is that of a finite, normal float. So it may pass through arithmetic in the
+    /// unused lane.
+    pub(super) const NORMAL: u32 = 1 << 29;
+
+    pub(super) fn new(TreeBox { min, max }: TreeBox, number: u32) -> Self {
+        Self { min: min.extend(0.0), max: max.extend(f32::from_bits(number | Self::NORMAL)) }
+    }
+
+    pub(super) fn number(&self) -> u32 {
+        self.max.w.to_bits() & !Self::NORMAL
+    }
+
+    /// Twice the centre.
+    #[inline(always)]
+    pub(super) fn centre(&self) -> Vec4 {
+        self.min + self.max
+    }
+}
+
+/// A box while it grows; the fourth lane means nothing.
+#[derive(Clone, Copy)]
+pub(super) struct Hull {
+    pub(super) min: Vec4,
+    pub(super) max: Vec4,
+}
+
+impl Hull {
+    pub(super) const EMPTY: Self = Self { min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
+
+    #[inline(always)]
+    pub(super) fn with(self, min: Vec4, max: Vec4) -> Self {
+        Self { min: self.min.min(min), max: self.max.max(max) }
+    }
+
+    #[inline(always)]
+    pub(super) fn union(self, other: Self) -> Self {
+        self.with(other.min, other.max)
+    }
+
+    /// Half the surface; 0 of nothing.
+    #[inline(always)]
+    pub(super) fn area(self) -> f32 {
+        let e = (self.max - self.min).max(Vec4::ZERO);
+        e.x * e.y + e.y * e.z + e.z * e.x
+    }
+
+    pub(super) fn of(items: &[Item]) -> Self {
+        gather(items, Self::EMPTY, |hull, item| hull.with(item.min, item.max), Self::union)
+    }
+
+    pub(super) fn of_centres(items: &[Item]) -> Self {
+        gather(items, Self::EMPTY, |hull, item| hull.with(item.centre(), item.centre()), Self::union)
+    }
+
+    pub(super) fn tree_box(self) -> TreeBox {
+        TreeBox { min: Vec3A::from_vec4(self.min), max: Vec3A::from_vec4(self.max) }
+    }
+}
+
+/// A fold over items, by several threads if they are many.
+pub(super) fn gather<T: Copy + Send + Sync>(
+    items: &[Item],
+    start: T,
+    fold: impl Fn(T, &Item) -> T + Sync,
+    join: impl Fn(T, T) -> T + Sync + Send,
+) -> T {
+    if items.len() < TOGETHER {
+        return items.iter().fold(start, fold);
+    }
+    items.par_chunks(TOGETHER / 4).map(|part| part.iter().fold(start, &fold)).reduce(|| start, join)
+}
+
+/// `N` slices of the centres' hull along each axis, a power of two: the box of the triangles in each, and their number.
+#[derive(Clone, Copy)]
+pub(super) struct Slices<const N: usize> {
+    pub(super) hulls: [[Hull; N]; 3],
+    counts: [[u32; N]; 3],
+}
+
+/// Which of `N` slices a centre is in.
+#[derive(Clone, Copy)]
+pub(super) struct Slicing<const N: usize> {
+    pub(super) lower: Vec4,
+    /// Slices per unit.
+    scale: Vec4,
+}
+
+impl<const N: usize> Slicing<N> {
+    #[allow(clippy::cast_precision_loss, reason = "a small number")]
+    pub(super) fn new(centres: Hull) -> Self {
+        // Less than one slice more than there are; and no slices along an axis without extent.
+        let extent = centres.max - centres.min;
+        let scale = Vec4::splat(N as f32 - 0.01) / extent;
+        let flat = !(extent.cmpgt(Vec4::ZERO) & scale.cmplt(Vec4::INFINITY));
+        Self { lower: centres.min, scale: Vec4::select(flat, Vec4::ZERO, scale) }
+    }
+
+    /// The slice along each axis. Adding 1.5·2²³ rounds to a whole number, which are then the last bits: no other
+    /// conversion is as cheap, and what is not a number stays within the slices.
+    #[inline(always)]
+    pub(super) fn slices(&self, centre: Vec4) -> [usize; 3] {
+        let v = ((centre - self.lower) * self.scale - 0.5) + 12_582_912.0;
+        [v.x, v.y, v.z].map(|x| x.to_bits() as usize & (N - 1))
+    }
+}
+
+impl<const N: usize> Slices<N> {
+    pub(super) const EMPTY: Self = Self { hulls: [[Hull::EMPTY; N]; 3], counts: [[0; N]; 3] };
+
+    #[inline(always)]
+    pub(super) fn add(&mut self, slicing: &Slicing<N>, item: &Item) {
+        for (axis, i) in slicing.slices(item.centre()).into_iter().enumerate() {
+            self.hulls[axis][i] = self.hulls[axis][i].with(item.min, item.max);
+            self.counts[axis][i] += 1;
+        }
+    }
+
+    pub(super) fn union(mut self, other: &Self) -> Self {
+        for axis in 0..3 {
+            for i in 0..N {
+                self.hulls[axis][i] = self.hulls[axis][i].union(other.hulls[axis][i]);
+                self.counts[axis][i] += other.counts[axis][i];
+            }
+        }
+        self
+    }
+
+    /// Of these items.
+    #[inline(never)]
+    pub(super) fn of(items: &[Item], slicing: &Slicing<N>) -> Self {
+        let fold = |part: &[Item]| {
+            let mut slices = Self::EMPTY;
+            part.iter().for_each(|item| slices.add(slicing, item));
+            slices
+        };
+        if items.len() < TOGETHER {
+            return fold(items);
+        }
+        items.par_chunks(TOGETHER / 4).map(fold).reduce(|| Self::EMPTY, |a, b| a.union(&b))
+    }
+
+    /// The axis, the last slice on the lower side, and the hulls of both sides. `None` if all are in one slice.
+    #[allow(clippy::cast_precision_loss, reason = "a cost")]
+    pub(super) fn cheapest(&self) -> Option<(usize, usize, [Hull; 2])> {
+        let mut best = (f32::INFINITY, None);
+        for axis in 0..3 {
+            let (hulls, counts) = (&self.hulls[axis], &self.counts[axis]);
+            let mut above = [(Hull::EMPTY, 0); N];
+            let mut side = (Hull::EMPTY, 0);
+            for i in (1..N).rev() {
+                side = (side.0.union(hulls[i]), side.1 + counts[i]);
+                above[i - 1] = side;
+            }
+            let mut side = (Hull::EMPTY, 0);
+            for i in 0..N - 1 {
+                side = (side.0.union(hulls[i]), side.1 + counts[i]);
+                let cost = side.0.area() * side.1 as f32 + above[i].0.area() * above[i].1 as f32;
+                if side.1 > 0 && above[i].1 > 0 && cost < best.0 {
+                    best = (cost, Some((axis, i, [side.0, above[i].0])));
+                }
+            }
+        }
+        best.1
+    }
+}
+
+/// How a large set was divided; its items are in that order.
+pub(super) struct Division {
+    pub(super) lower: usize,
+    pub(super) hulls: [Hull; 2],
+    pub(super) uneven: u32,
+    pub(super) below: [Option<Box<Division>>; 2],
+}
+
+/// Divides a set in two: how many are on the lower side, which are moved to the front, and the hulls of both. At least
+/// two items.
+pub(super) fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
+    let centres = Hull::of_centres(items);
+    if uneven <= UNEVEN {
+        // With few triangles the slices, not the triangles, take the time.
+        let cheapest = match items.len() {
+            ..=8 => divide_cheapest::<4>(items, centres),
+            9..=32 => divide_cheapest::<8>(items, centres),
+            _ => divide_cheapest::<16>(items, centres),
+        };
+        if let Some(division) = cheapest {
+            return division;
+        }
+    }
+    // In the middle along the longest axis; equal centres in the order that they have.
+    let middle = items.len() / 2;
+    let e = centres.max - centres.min;
+    let axis = if e.x >= e.y && e.x >= e.z { 0 } else { 1 + usize::from(e.y < e.z) };
+    if e[axis] > 0.0 {
+        items.select_nth_unstable_by(middle, |a, b| {
+            a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.number().cmp(&b.number()))
+        });
+    }
+    let (lower, upper) = items.split_at(middle);
+    (middle, [Hull::of(lower), Hull::of(upper)])
+}
+
+/// The division between two of `N` slices that costs least. `None` if all centres are in one slice.
+pub(super) fn divide_cheapest<const N: usize>(items: &mut [Item], centres: Hull) -> Option<(usize, [Hull; 2])> {
+    let slicing = Slicing::<N>::new(centres);
+    let (axis, last, hulls) = Slices::of(items, &slicing).cheapest()?;
+    Some((partition(items, |item| slicing.slices(item.centre())[axis] <= last), hulls))
+}
+
+/// Moves the items that belong to the lower side to the front and counts them. Without a branch, which would be guessed
+/// wrongly as often as not.
+pub(super) fn partition(items: &mut [Item], is_lower: impl Fn(&Item) -> bool) -> usize {
+    let mut lower = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        items.swap(i, lower);
+        lower += usize::from(is_lower(&item));
+    }
+    lower
+}
+
+/// The count of uneven divisions below a division.
+pub(super) fn count_uneven(uneven: u32, lower: usize, all: usize) -> u32 {
+    uneven + u32::from(lower.max(all - lower) > all - all / 8)
+}
+
+/// Divides large sets in parallel, down to those that a thread builds alone.
+pub(super) fn divide_large(items: &mut [Item], uneven: u32, bunch: usize) -> Option<Box<Division>> {
+    if items.len() <= bunch {
+        return None;
+    }
+    let items_len = items.len();
+    let (lower, hulls) = divide(items, uneven);
+    let uneven = count_uneven(uneven, lower, items_len);
+    let (a, b) = items.split_at_mut(lower);
+    let (mut of_a, mut of_b) = (|| divide_large(a, uneven, bunch), || divide_large(b, uneven, bunch));
+    let (below_a, below_b) = if items_len > ALONE { rayon::join(of_a, of_b) } else { (of_a(), of_b()) };
+    Some(Box::new(Division { lower, hulls, uneven, below: [below_a, below_b] }))
+}
