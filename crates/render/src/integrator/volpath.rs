@@ -29,7 +29,7 @@ impl<R: Recorder> Tracer<'_, R> {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
             let tau = sample_free_flight(sampler);
-            match self.first_event(&path, tau, counters) {
+            match self.first_event(&mut path, tau, counters) {
                 Event::Collision { point, medium, regions } => {
                     path.depth += 1;
                     if !self.may_scatter(path.depth) {
@@ -57,15 +57,17 @@ impl<R: Recorder> Tracer<'_, R> {
 
     /// The first event on the path's ray, for a free flight of optical depth `tau`.
     #[inline]
-    fn first_event(&self, path: &Path, tau: f64, counters: &mut Counters) -> Event {
-        let ray = &path.ray;
+    fn first_event(&self, path: &mut Path, tau: f64, counters: &mut Counters) -> Event {
+        let on_surface = path.on_surface;
+        let ray = &mut path.ray;
         let media = &self.world.media;
         let start = media.medium_in(&ray.regions);
         if let Some(medium) = start
             && let Some(flight) = media.short_flight(&ray.segment, medium, tau)
         {
-            return match self.visibility.intersect_flight(&flight, !path.on_surface, counters) {
-                None => Event::Collision { point: flight.q, medium, regions: ray.regions.clone() },
+            return match self.visibility.intersect_flight(&flight, !on_surface, counters) {
+                // The next ray takes them over.
+                None => Event::Collision { point: flight.q, medium, regions: std::mem::take(&mut ray.regions) },
                 Some(hit) => {
                     let surface = self.world.surface_point(&hit, ray.direction);
                     // The way to the surface is a part of the flight, but where a ray starts from a surface is beside that.

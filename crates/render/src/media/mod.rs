@@ -145,7 +145,7 @@ impl Media {
         };
         match self.regions.walk(segment, start, spend) {
             ControlFlow::Break((t, medium, i, regions)) => self.collision(segment, start, t, medium, &i, regions),
-            ControlFlow::Continue(regions) => FreeFlight::Passed(regions),
+            ControlFlow::Continue(regions) => FreeFlight::Passed(regions.unwrap_or_else(|| start.clone())),
         }
     }
 
@@ -180,7 +180,7 @@ impl Media {
             ControlFlow::<std::convert::Infallible>::Continue(())
         });
         let end = match walked {
-            ControlFlow::Continue(regions) => regions,
+            ControlFlow::Continue(regions) => regions.unwrap_or_else(|| start.clone()),
             ControlFlow::Break(never) => match never {},
         };
         MediumIntervals {

@@ -173,6 +173,6 @@ fn open_boundaries_close_together() {
         let mut wanted = vec![None, expected[0], expected[1], None];
         wanted.dedup();
         assert_eq!(found, wanted);
-        assert!(matches!(end, ControlFlow::Continue(set) if set == RegionSet::default()));
+        assert!(matches!(end, ControlFlow::Continue(Some(set)) if set == RegionSet::default()));
     }
 }
