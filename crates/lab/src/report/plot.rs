@@ -80,7 +80,7 @@ impl Series {
         let dash = match method.point_prover() {
             PointProver::Field => 0,
             PointProver::Safe => 1,
-            PointProver::Extended => 2,
+            _ => 2,
         };
         Self { name: String::new(), points: vec![], colour, dash }
     }

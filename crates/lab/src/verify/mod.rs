@@ -89,7 +89,7 @@ impl VerifyOptions {
     /// Checks what can be checked before anything is built.
     ///
     /// # Errors
-    /// [`RenderError::Option`] names the option and what it has to be.
+    /// [`vdf_render::RenderError::Option`] names the option and what it has to be.
     pub fn validate(&self) -> Result<(), LabError> {
         if self.segments == 0 {
             return Err(LabError::option("segments", "must be at least 1"));

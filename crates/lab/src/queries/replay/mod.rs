@@ -57,7 +57,7 @@ impl ReplayOptions {
     /// Checks what can be checked without a scene.
     ///
     /// # Errors
-    /// [`RenderError::Option`] names the option and what it has to be.
+    /// [`vdf_render::RenderError::Option`] names the option and what it has to be.
     pub fn validate(&self) -> Result<(), LabError> {
         if self.passes == 0 {
             return Err(LabError::option("passes", "must be at least 1"));
