@@ -5,14 +5,13 @@
 
 use std::time::Instant;
 
-use glam::DVec3;
 use rayon::prelude::*;
 use vdf_distfield::{ExtendedNeighbourhood, SafeNeighbourhood, VoxelBox};
 use vdf_geometry::{Bounds, Triangle};
 use vdf_voxel::{Resolution, Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
-    AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightProver, Method, PointProver, Provers,
+    AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightProver, LightShape, Method, PointProver, Provers,
     VisibilityError,
     prover::{Occluders, Site, each_field},
 };
@@ -36,17 +35,6 @@ impl Default for ProverOptions {
     fn default() -> Self {
         Self { method: Method::default(), voxel_size: 1.0, max_voxels: 1 << 29, max_bytes: 4 << 30 }
     }
-}
-
-/// Where an emitter is, as far as proofs are concerned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LightShape<'a> {
-    /// A point, in world units.
-    Point(DVec3),
-    /// Some of the occluders.
-    Area(&'a [Triangle]),
-    /// Infinitely far away.
-    Infinite,
 }
 
 /// What was built, how large it is and how long it took.
@@ -267,7 +255,7 @@ impl LightBuilder<'_> {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
+    use glam::{DVec3, Vec3};
 
     use super::*;
 

@@ -32,13 +32,15 @@
 mod build;
 mod counters;
 mod error;
+mod light;
 mod method;
 mod prover;
 mod query;
 
-pub use build::{BuildReport, BuiltPart, LightReport, LightShape, ProverOptions};
+pub use build::{BuildReport, BuiltPart, LightReport, ProverOptions};
 pub use counters::Counters;
 pub use error::VisibilityError;
+pub use light::LightShape;
 pub use method::{FieldKind, Method, PointProver, UnknownMethod, method_table};
 pub use prover::{Answer, AreaNeighbourhood, DistanceField, FieldProver, LightProver, Provers};
 pub use query::{NoRecorder, QueryKind, Recorder, ShadowQuery, Visibility};
