@@ -254,7 +254,11 @@ fn failures() {
     }
     sandbox.fails(&["report", "scaling", "--csv", "no/x.csv"], 1, &["cannot write no/x.csv: No such file"]);
     sandbox.fails(&["render", "--record-queries", "no/x.vdfq"], 1, &["cannot write no/x.vdfq: No such file"]);
-    sandbox.fails(&["render", "--record-queries", "a.exr", "-o", "a.exr"], 2, &["the image is written there"]);
+    sandbox.fails(
+        &["render", "--record-queries", "a.exr", "-o", "a.exr"],
+        2,
+        &["--output and --record-queries both write a.exr"],
+    );
     sandbox.fails(&["render", "--record-queries", "a", "--max-queries", "0"], 2, &["--max-queries must be at least 1"]);
     sandbox.fails(&["render", "--max-queries", "9"], 2, &["--record-queries"]);
 

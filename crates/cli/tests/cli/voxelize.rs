@@ -9,7 +9,7 @@ fn lines<'a>(text: &'a str, start: &'a str) -> impl Iterator<Item = &'a str> {
 #[test]
 fn figures_only() {
     let sandbox = Sandbox::new();
-    let out = sandbox.run(&["voxelize", "--voxel", "8"]).succeeded().stdout;
+    let out = sandbox.run(&["voxelize", "--voxel", "8", "--grid", "scene"]).succeeded().stdout;
     assert!(
         out.starts_with("grid           77 x 73 x 169 voxels of 8\norigin         -26 -16 -790\noccupied "),
         "{out}"
@@ -23,7 +23,10 @@ fn figures_only() {
 #[test]
 fn exported_files() {
     let sandbox = Sandbox::new();
-    let out = sandbox.run(&["voxelize", "cbox_vol3", "--voxel", "32", "--export", "a/b"]).succeeded().stdout;
+    let out = sandbox
+        .run(&["voxelize", "cbox_vol3", "--voxel", "32", "--grid", "scene", "--export", "a/b"])
+        .succeeded()
+        .stdout;
     let wrote: Vec<_> = lines(&out, "wrote").map(|l| l.split_whitespace().nth(1).unwrap()).collect();
     let names = ["occupied.obj", "occupied.txt", "neighbourhood0.obj", "neighbourhood0.txt"];
     let names = names.into_iter().chain(["neighbourhood1.obj", "neighbourhood1.txt"]);
