@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may fail, too")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus};
+use std::process::{Command, ExitStatus, Stdio};
 
 use vdf_image::{Image, ImageError, Rgb, StagedFile, remove_temporaries, stage_exr, write_exr, write_png};
 
@@ -22,6 +22,9 @@ fn again(test: &str, folder: &Path, before: &str) -> ExitStatus {
         .arg(format!("{before} exec \"$0\" --exact {test} --nocapture"))
         .arg(std::env::current_exe().unwrap())
         .env(FOLDER, folder)
+        // A limit to the size of files would also hold for a log that the output goes to.
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
         .status()
         .unwrap()
 }
