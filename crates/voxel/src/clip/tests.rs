@@ -146,3 +146,49 @@ proptest! {
         }
     }
 }
+
+/// The twin of the voxel of entry: along each axis every place of the segment that is in the grid lies between that voxel and the one of the
+/// end inside. Segments along axes, through corners and from absurdly far are among them; what cannot be clipped has no entry.
+#[test]
+fn the_part_in_the_grid_lies_between_entry_and_end() {
+    let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::new(7.0, 5.0, 3.0), 1.0, 1 << 20).unwrap();
+    let mut state = 1_u64;
+    let mut unit = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut places = 0;
+    for case in 0..20_000 {
+        let mut inside = DVec3::new(7.0 * unit(), 5.0 * unit(), 3.0 * unit());
+        let far = [0.5, 3.0, 1e3, 1e9, 1e15][case % 5];
+        let mut outside = inside + DVec3::new(unit() - 0.5, unit() - 0.5, unit() - 0.5) * far;
+        for axis in 0..3 {
+            if unit() < 0.3 {
+                inside[axis] = inside[axis].round();
+            }
+            if unit() < 0.3 {
+                outside[axis] = inside[axis];
+            }
+        }
+        let end = grid.voxel_containing(inside).unwrap();
+        if grid.voxel_containing(outside).is_some() {
+            continue;
+        }
+        let entry = grid.entry_voxel(outside, inside).unwrap();
+        for k in 0..200 {
+            // Dense near the end inside, where the part in the grid of a long segment is.
+            let t = (f64::from(k) / 199.0).powi(3) * (12.0 / outside.distance(inside)).min(1.0);
+            let Some(v) = grid.voxel_containing(inside + (outside - inside) * t) else { continue };
+            places += 1;
+            let between = |a: u32, v: u32, b: u32| (a.min(b)..=a.max(b)).contains(&v);
+            assert!(
+                between(entry.i, v.i, end.i) && between(entry.j, v.j, end.j) && between(entry.k, v.k, end.k),
+                "{outside} to {inside}: {v} is not between {entry} and {end}"
+            );
+        }
+    }
+    assert!(places > 100_000, "{places}");
+    for bad in [f64::NAN, f64::INFINITY, 1e201] {
+        assert_eq!(grid.entry_voxel(DVec3::new(bad, 1.0, 1.0), DVec3::ONE), None);
+    }
+}
