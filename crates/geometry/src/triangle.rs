@@ -45,6 +45,35 @@ impl Triangle {
         if along.abs() > error { along < 0.0 } else { self.is_entered_exactly(segment) }
     }
 
+    /// On which side of the triangle's plane `point` lies, exactly: positive below it, where the normal points away from, negative above, zero
+    /// on the plane, and zero for a triangle without area. Only the sign means anything.
+    #[must_use]
+    pub fn side(&self, point: DVec3) -> f64 {
+        let coord = |v: DVec3| robust::Coord3D { x: v.x, y: v.y, z: v.z };
+        let [a, b, c] = self.vertices_f64().map(coord);
+        robust::orient3d(a, b, c, coord(point))
+    }
+
+    /// Whether `point` lies on the closed triangle, exactly. Nothing lies on a triangle without area, as no segment meets one.
+    #[must_use]
+    pub fn holds(&self, point: DVec3) -> bool {
+        if self.side(point) != 0.0 {
+            return false;
+        }
+        // In the plane: along an axis along which the triangle has an area, all is seen in two dimensions.
+        let [a, b, c] = self.vertices_f64();
+        (0..3).any(|axis| {
+            let flat = |v: DVec3| robust::Coord { x: v[(axis + 1) % 3], y: v[(axis + 2) % 3] };
+            let [a, b, c, p] = [a, b, c, point].map(flat);
+            let area = robust::orient2d(a, b, c);
+            let within = |side: f64| side == 0.0 || (side > 0.0) == (area > 0.0);
+            area != 0.0
+                && within(robust::orient2d(a, b, p))
+                && within(robust::orient2d(b, c, p))
+                && within(robust::orient2d(c, a, p))
+        })
+    }
+
     #[cold]
     fn is_entered_exactly(&self, segment: &Segment) -> bool {
         let coord = |v: DVec3| robust::Coord3D { x: v.x, y: v.y, z: v.z };
@@ -65,6 +94,19 @@ impl Triangle {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Points on a triangle whose coordinates make them exact, and such an ulp beside it.
+    #[test]
+    fn what_lies_on_a_triangle_is_exact() {
+        let t = Triangle::new(Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0));
+        for on in [DVec3::X, DVec3::Y, DVec3::new(0.5, 0.5, 0.0), DVec3::new(0.25, 0.25, 0.5)] {
+            assert!(t.holds(on), "{on}");
+            assert!(!t.holds(on.with_z(on.z + 1e-300_f64.max(on.z * f64::EPSILON))), "{on}");
+        }
+        assert!(!t.holds(DVec3::new(1.5, -0.5, 0.0)), "in the plane, beside it");
+        assert!(!Triangle::new(Vec3::ZERO, Vec3::X, Vec3::X * 2.0).holds(DVec3::X));
+        assert!(t.side(DVec3::ZERO) > 0.0 && t.side(DVec3::ONE) < 0.0 && t.side(DVec3::X) == 0.0);
+    }
 
     /// Segments through a triangle from either side, at angles down to grazing, and ones that end or start on it.
     #[test]

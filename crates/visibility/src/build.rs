@@ -1,7 +1,8 @@
-//! Building what a method needs: voxels, a distance field, a prover for each light; within a limit of memory.
+//! Building what a method needs: light buffers, voxels, a distance field, a prover for each light; within a limit of memory.
 //!
-//! The voxels and the field must fit, or nothing is built. Then lights get their provers in the order of their list, as
-//! long as these fit; the lights that are left ask the field. All sizes are known before anything is allocated.
+//! Point lights get their buffers first, if the method has any. Voxels are built if a field or a light needs them; they and the field must
+//! fit, or nothing is built. Then lights get their neighbourhoods in the order of their list, as long as these fit; the
+//! lights that are left ask the field, if there is one. All sizes but those of buffers are known before anything is allocated.
 
 use std::time::Instant;
 
@@ -11,8 +12,8 @@ use vdf_geometry::{Bounds, Triangle};
 use vdf_voxel::{Resolution, Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
-    AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightProver, LightShape, Method, PointProver, Provers,
-    VisibilityError,
+    AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightBuffer, LightProver, LightShape, Method,
+    PointProver, Provers, VisibilityError,
     prover::{Occluders, Site, each_field},
 };
 
@@ -21,26 +22,28 @@ use crate::{
 pub struct ProverOptions {
     /// The method.
     pub method: Method,
-    /// Side of a voxel in world units; positive.
+    /// Side of a voxel in world units; positive. Of no matter where the method needs no voxels for these lights.
     pub voxel_size: f64,
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
-    /// The most memory in bytes that the voxels, the field and all neighbourhoods may take together. Building takes
+    /// The most memory in bytes that the voxels, the field and what is kept for lights may take together. Building takes
     /// some more for a while: for each thread that builds the neighbourhood of an area light three bits a voxel.
     pub max_bytes: u64,
+    /// Texels along each side of a face of a light buffer, rounded up to a power of two of at least 64; `None` chooses.
+    pub texels: Option<u32>,
 }
 
 impl Default for ProverOptions {
-    /// `amr-xsn` with voxels of 1 unit, at most 2²⁹ of them and 4 GiB.
+    /// `lb` with voxels of 1 unit where it needs any, at most 2²⁹ of them and 4 GiB.
     fn default() -> Self {
-        Self { method: Method::default(), voxel_size: 1.0, max_voxels: 1 << 29, max_bytes: 4 << 30 }
+        Self { method: Method::default(), voxel_size: 1.0, max_voxels: 1 << 29, max_bytes: 4 << 30, texels: None }
     }
 }
 
 /// What was built, how large it is and how long it took.
 #[derive(Clone, Debug, Default)]
 pub struct BuildReport {
-    /// Voxels along x, y and z; `None` for the method `none`.
+    /// Voxels along x, y and z; `None` if the method needs none for these lights.
     pub resolution: Option<[u32; 3]>,
     /// Side of a voxel in world units.
     pub voxel_size: f64,
@@ -57,7 +60,7 @@ pub struct BuildReport {
 /// One step of a build.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuiltPart {
-    /// What was built: "voxels", "field" or "neighbourhoods".
+    /// What was built: "light buffers", "voxels", "field" or "neighbourhoods".
     pub name: &'static str,
     /// Its memory in bytes.
     pub bytes: usize,
@@ -70,9 +73,12 @@ pub struct BuiltPart {
 pub struct LightReport {
     /// Voxels of its neighbourhood, if it has one.
     pub voxels: Option<usize>,
+    /// Texels along each side of a face of its light buffer, if it has one.
+    pub texels: Option<u32>,
     /// Its memory in bytes.
     pub bytes: usize,
-    /// Why queries to it ask the field although the method would keep a neighbourhood for it; `None` if that is not so.
+    /// Why it has not what the method would keep for it; `None` if that is not so. A light without a buffer gets a neighbourhood, one without
+    /// a neighbourhood asks the field, if there is one.
     pub fallback: Option<&'static str>,
 }
 
@@ -109,20 +115,49 @@ impl Provers {
     /// `bounds`, which must hold all occluders. Runs on the current rayon pool.
     ///
     /// # Errors
-    /// If the voxel size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and
-    /// field `options.max_bytes`. A neighbourhood that exceeds `max_bytes` is no error: see [`LightReport::fallback`].
+    /// If voxels are needed and their size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and
+    /// field `options.max_bytes`. What is kept for a light and exceeds `max_bytes` is no error: see [`LightReport::fallback`].
     pub fn build(
         options: &ProverOptions,
         triangles: &[Triangle],
         bounds: Bounds,
         lights: &[LightShape<'_>],
     ) -> Result<(Self, BuildReport), VisibilityError> {
-        let mut report = BuildReport { lights: vec![LightReport::default(); lights.len()], ..BuildReport::default() };
-        let Some(kind) = options.method.field() else { return Ok((Self::none(), report)) };
-        let (max_voxels, max_bytes) = (options.max_voxels, options.max_bytes);
+        let mut report = BuildReport::default();
+        let method = options.method;
+        let mut kept: Vec<Kept> = lights.iter().map(|_| Kept::default()).collect();
+        let mut max_bytes = options.max_bytes;
+        if method.point_prover() == PointProver::Buffer {
+            report.step(
+                "light buffers",
+                || {
+                    build_buffers(options, triangles, lights, &mut kept);
+                    Ok(())
+                },
+                |()| 0,
+            )?;
+            let bytes = kept.iter().map(Kept::bytes).sum();
+            report.parts[0].bytes = bytes;
+            max_bytes = max_bytes.saturating_sub(bytes as u64);
+        }
+        let wanting = |(light, kept): (&LightShape<'_>, &Kept)| *light != LightShape::Infinite && kept.prover.is_none();
+        let needs_voxels = match method.point_prover() {
+            PointProver::Buffer => lights.iter().zip(&kept).any(wanting),
+            _ => method.field().is_some(),
+        };
+        if !needs_voxels {
+            return Ok((report.finished(None, None, kept), report));
+        }
+        let kind = method.field();
         let bytes = |resolution| shared_bytes(kind, resolution);
-        let grid =
-            VoxelGrid::covering_within(bounds.min, bounds.max, options.voxel_size, max_voxels, max_bytes, bytes)?;
+        let grid = VoxelGrid::covering_within(
+            bounds.min,
+            bounds.max,
+            options.voxel_size,
+            options.max_voxels,
+            max_bytes,
+            bytes,
+        )?;
         let free = max_bytes.saturating_sub(bytes(grid.resolution()));
         let occupied = report.step(
             "voxels",
@@ -133,33 +168,87 @@ impl Provers {
         report.resolution = Some(r.sides());
         report.voxel_size = options.voxel_size;
         (report.occupied, report.voxels) = (occupied.count(), r.voxel_count());
-        let field = report.step("field", || Ok(DistanceField::build(kind, &occupied)), DistanceField::bytes)?;
+        let field = match kind {
+            Some(kind) => {
+                Some(report.step("field", || Ok(DistanceField::build(kind, &occupied)), DistanceField::bytes)?)
+            }
+            None => None,
+        };
+        let builder = LightBuilder { point: method.point_prover(), grid, occupied: &occupied, field: field.as_ref() };
+        report.step("neighbourhoods", || builder.build_wanting(triangles, lights, &mut kept, free), |&bytes| bytes)?;
+        let field = field.map(|field| FieldProver::new(grid, field));
+        Ok((report.finished(Some(grid), field, kept), report))
+    }
+}
 
-        let builder = LightBuilder { point: options.method.point_prover(), grid, occupied: &occupied, field: &field };
-        let provers = report.step(
-            "neighbourhoods",
-            || builder.provers(triangles, lights, free),
-            |all| all.iter().map(|(prover, _)| prover.bytes()).sum(),
-        )?;
-        let (provers, lights) = provers
-            .into_iter()
-            .map(|(prover, fallback)| {
-                let light = LightReport { voxels: prover.voxels(), bytes: prover.bytes(), fallback };
-                (prover, light)
-            })
-            .unzip();
-        report.lights = lights;
-        Ok((Self::new(grid, Some(FieldProver::new(grid, field)), provers), report))
+impl BuildReport {
+    /// The provers of what was built, and the lights' part of this report.
+    fn finished(&mut self, grid: Option<VoxelGrid>, field: Option<FieldProver>, kept: Vec<Kept>) -> Provers {
+        let lights = kept.into_iter().map(|kept| {
+            let prover = kept.prover.unwrap_or(LightProver::Field);
+            self.lights.push(LightReport {
+                voxels: prover.voxels(),
+                texels: prover.texels(),
+                bytes: prover.bytes(),
+                fallback: kept.fallback,
+            });
+            prover
+        });
+        let lights = lights.collect();
+        Provers::new(grid, field, lights)
+    }
+}
+
+/// What is kept for a light so far.
+#[derive(Default)]
+struct Kept {
+    prover: Option<LightProver>,
+    /// Why it is not what the method would keep.
+    fallback: Option<&'static str>,
+}
+
+impl Kept {
+    fn bytes(&self) -> usize {
+        self.prover.as_ref().map_or(0, LightProver::bytes)
+    }
+}
+
+/// Texels along each side of a light buffer's faces where nobody says: about as many in all as there are triangles, and no more than fit.
+fn default_texels(triangles: usize, bytes_for_each: u64) -> u32 {
+    let few = (triangles as f64).sqrt() as u32;
+    let mut side = few.next_power_of_two().clamp(128, 1024);
+    // Lists and records take about as much as texels.
+    while side > 64 && LightBuffer::texel_bytes(side) * 2 > bytes_for_each {
+        side /= 2;
+    }
+    side
+}
+
+/// Builds the buffers of all point lights, one after the other, each on all threads, as long as they fit.
+fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[LightShape<'_>], kept: &mut [Kept]) {
+    let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count() as u64;
+    let side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), options.max_bytes / count.max(1)));
+    let mut free = options.max_bytes;
+    for (light, kept) in lights.iter().zip(kept) {
+        let LightShape::Point(position) = light else { continue };
+        match LightBuffer::build(triangles, *position, side, free) {
+            Ok(buffer) => {
+                free -= buffer.bytes() as u64;
+                kept.prover = Some(LightProver::Buffer(buffer));
+            }
+            Err(refusal) => kept.fallback = Some(refusal.reason()),
+        }
     }
 }
 
 /// The memory of the voxels and of a field over them, in bytes.
-fn shared_bytes(kind: FieldKind, resolution: Resolution) -> u64 {
+fn shared_bytes(kind: Option<FieldKind>, resolution: Resolution) -> u64 {
     let planes = match kind {
-        FieldKind::Ndf => 1,
-        FieldKind::Amr => 8,
-        FieldKind::Dsz => 6,
-        FieldKind::Dual => 7,
+        None => 0,
+        Some(FieldKind::Ndf) => 1,
+        Some(FieldKind::Amr) => 8,
+        Some(FieldKind::Dsz) => 6,
+        Some(FieldKind::Dual) => 7,
     };
     (resolution.voxel_count() as u64).saturating_mul(planes).saturating_add(VoxelSet::bytes_of(resolution))
 }
@@ -182,20 +271,22 @@ struct LightBuilder<'a> {
     point: PointProver,
     grid: VoxelGrid,
     occupied: &'a VoxelSet,
-    field: &'a DistanceField,
+    field: Option<&'a DistanceField>,
 }
 
 impl LightBuilder<'_> {
-    /// The prover of each light, and why it is only the field. In parallel over lights.
-    fn provers(
+    /// Builds neighbourhoods for the lights that have nothing yet, in parallel over lights: how many bytes they take.
+    fn build_wanting(
         &self,
         triangles: &[Triangle],
         lights: &[LightShape<'_>],
+        kept: &mut [Kept],
         free: u64,
-    ) -> Result<Vec<(LightProver, Option<&'static str>)>, VisibilityError> {
+    ) -> Result<usize, VisibilityError> {
         let any_area = self.point != PointProver::Field && lights.iter().any(|l| matches!(l, LightShape::Area(_)));
         let occluders = Occluders::new(&self.grid, if any_area { triangles } else { &[] }, self.occupied)?;
-        let mut plans: Vec<_> = lights.par_iter().map(|light| self.plan(&occluders, light)).collect();
+        let mut wanting: Vec<_> = lights.iter().zip(kept).filter(|(_, kept)| kept.prover.is_none()).collect();
+        let mut plans: Vec<_> = wanting.par_iter().map(|(light, _)| self.plan(&occluders, light)).collect();
         let mut free = free;
         for plan in &mut plans {
             match free.checked_sub(self.bytes(plan)) {
@@ -203,7 +294,15 @@ impl LightBuilder<'_> {
                 None => *plan = Plan::Field(Some("its neighbourhood does not fit into the limit of memory")),
             }
         }
-        plans.into_par_iter().map(|plan| Ok(self.build(&occluders, plan)?)).collect()
+        let built: Vec<_> = plans.into_par_iter().map(|plan| self.build(&occluders, plan)).collect::<Result<_, _>>()?;
+        let mut bytes = 0;
+        for ((_, kept), (prover, fallback)) in wanting.iter_mut().zip(built) {
+            bytes += prover.bytes();
+            kept.prover = Some(prover);
+            // The first reason is the one that names the method's own structure.
+            kept.fallback = kept.fallback.or(fallback);
+        }
+        Ok(bytes)
     }
 
     fn plan(&self, occluders: &Occluders<'_>, light: &LightShape<'_>) -> Plan {
@@ -229,7 +328,7 @@ impl LightBuilder<'_> {
         match (plan, self.point) {
             (Plan::Field(_), _) | (Plan::Point(_), PointProver::Field) => 0,
             (Plan::Point(_), PointProver::Safe) => VoxelSet::bytes_of(resolution),
-            (Plan::Point(_), PointProver::Extended) => extended,
+            (Plan::Point(_), PointProver::Extended | PointProver::Buffer) => extended,
             (Plan::Area(..), _) => extended.saturating_add(NEAR_BYTES),
         }
     }
@@ -243,12 +342,14 @@ impl LightBuilder<'_> {
     }
 
     fn point_prover(&self, light: Voxel) -> LightProver {
-        match self.point {
-            PointProver::Field => LightProver::Field,
-            PointProver::Safe => {
-                LightProver::Safe(each_field!(self.field, field => SafeNeighbourhood::new(field, self.occupied, light)))
+        match (self.point, self.field) {
+            (PointProver::Safe, Some(field)) => {
+                LightProver::Safe(each_field!(field, field => SafeNeighbourhood::new(field, self.occupied, light)))
             }
-            PointProver::Extended => LightProver::Extended(ExtendedNeighbourhood::new(self.occupied, light.into())),
+            (PointProver::Extended | PointProver::Buffer, _) => {
+                LightProver::Extended(ExtendedNeighbourhood::new(self.occupied, light.into()))
+            }
+            (PointProver::Field, _) | (PointProver::Safe, None) => LightProver::Field,
         }
     }
 }
@@ -285,15 +386,15 @@ mod tests {
     #[test]
     fn memory_is_as_estimated() {
         let lights = [LightShape::Point(DVec3::splat(2.0)), LightShape::Area(&WALL)];
-        for method in Method::proving() {
+        for method in Method::with_voxels() {
             let report = build(ProverOptions { method, ..options("none", 1 << 30) }, &lights).expect("fits");
-            let estimate = method.field().map(|kind| shared_bytes(kind, Resolution::new(100, 100, 100)));
-            assert_eq!(estimate, Some((report.parts[0].bytes + report.parts[1].bytes) as u64), "{method}");
+            let estimate = shared_bytes(method.field(), Resolution::new(100, 100, 100));
+            assert_eq!(estimate, (report.parts[0].bytes + report.parts[1].bytes) as u64, "{method}");
             let bytes = report.lights.iter().map(|l| l.bytes).collect::<Vec<_>>();
             match method.point_prover() {
                 PointProver::Field => assert_eq!(bytes, [0, 0]),
                 PointProver::Safe => assert_eq!(bytes[0], 8 * 2 * 100 * 100),
-                PointProver::Extended => assert_eq!(bytes[0], 8 * 100 * 100),
+                PointProver::Extended | PointProver::Buffer => assert_eq!(bytes[0], 8 * 100 * 100),
             }
             assert!(bytes[1] < (8 * 100 * 100 + NEAR_BYTES) as usize);
         }

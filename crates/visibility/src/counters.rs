@@ -13,6 +13,10 @@ pub struct Counters {
     pub on_light: u64,
     /// Those of them that a proof answered.
     pub on_light_proved: u64,
+    /// Superficial queries from a surface that a proof answered: only light buffers can.
+    pub superficial_proved: u64,
+    /// Of all that a proof answered those that are occluded: only light buffers say so.
+    pub proved_occluded: u64,
     /// Rays cast for the first occluder.
     pub rays: u64,
     /// Free flights that were asked for a proof: those that neither start nor end on an occluder.
@@ -32,6 +36,8 @@ impl std::ops::AddAssign for Counters {
         self.proved += other.proved;
         self.on_light += other.on_light;
         self.on_light_proved += other.on_light_proved;
+        self.superficial_proved += other.superficial_proved;
+        self.proved_occluded += other.proved_occluded;
         self.rays += other.rays;
         self.flights += other.flights;
         self.flights_proved += other.flights_proved;

@@ -42,5 +42,7 @@ pub use counters::Counters;
 pub use error::VisibilityError;
 pub use light::LightShape;
 pub use method::{FieldKind, Method, PointProver, UnknownMethod, method_table};
-pub use prover::{Answer, AreaNeighbourhood, DistanceField, FieldProver, LightProver, Provers};
+pub use prover::{
+    Answer, AreaNeighbourhood, DistanceField, FieldProver, LightBuffer, LightProver, LookUp, Provers, Refusal,
+};
 pub use query::{NoRecorder, QueryKind, Recorder, ShadowQuery, Visibility};

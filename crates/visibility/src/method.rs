@@ -26,6 +26,8 @@ pub enum PointProver {
     Safe,
     /// `-xsn`: all that free cuboids prove (4.4.1).
     Extended,
+    /// `lb`: a light buffer; where there can be none, all that free cuboids prove.
+    Buffer,
 }
 
 /// A row of the table.
@@ -50,9 +52,9 @@ const fn recipe(
 }
 
 /// All methods, the plainest first. A new one is a row here, and where it needs a new prover a file in `prover/`.
-static RECIPES: [Recipe; 13] = {
+static RECIPES: [Recipe; 14] = {
     use FieldKind::{Amr, Dsz, Dual, Ndf};
-    use PointProver::{Extended, Field, Safe};
+    use PointProver::{Buffer, Extended, Field, Safe};
     const SAFE: &str = "as above, and 1 bit a voxel for each point light: its safe neighbourhood";
     const EXTENDED: &str = "as above, but 8 bytes a row of voxels for each point light: all free cuboids";
     [
@@ -69,6 +71,13 @@ static RECIPES: [Recipe; 13] = {
         recipe("dual", Dual, Field, "7 bytes a voxel: one Manhattan distance and six extents", "up to eight loads"),
         recipe("dual-sn", Dual, Safe, SAFE, "one bit"),
         recipe("dual-xsn", Dual, Extended, EXTENDED, "one row"),
+        Recipe {
+            name: "lb",
+            field: None,
+            point: Buffer,
+            stores: "a cube map around each point light: 8 bytes a texel, and the triangles that decide where depths do not",
+            query: "one texel, or a short list",
+        },
     ]
 };
 
@@ -80,8 +89,8 @@ impl Method {
     /// Every query goes to the hierarchy.
     pub const NONE: Self = Self(0);
 
-    /// `amr-xsn`, which proves the most.
-    const STANDARD: Self = Self(6);
+    /// `lb`, which answers nearly everything.
+    const STANDARD: Self = Self(13);
 
     /// All methods, the plainest first.
     pub fn all() -> impl DoubleEndedIterator<Item = Self> + Clone {
@@ -93,7 +102,12 @@ impl Method {
         Self::all().filter(|&m| m != Self::NONE)
     }
 
-    /// The method with this field and this prover for point lights.
+    /// The methods of the thesis: those that prove from voxels.
+    pub fn with_voxels() -> impl DoubleEndedIterator<Item = Self> + Clone {
+        Self::all().filter(|m| m.field().is_some())
+    }
+
+    /// The method with this field and this prover for point lights; [`Self::NONE`] if there is none.
     #[must_use]
     pub fn of(field: FieldKind, point: PointProver) -> Self {
         Self::all().find(|m| (m.field(), m.point_prover()) == (Some(field), point)).unwrap_or(Self::NONE)
@@ -121,8 +135,8 @@ impl Method {
         self.recipe().point
     }
 
-    /// The method for a scene with such emitters where none is asked for: [`Self::default`] if there is one that a neighbourhood can be
-    /// kept for, else [`Self::NONE`]. Towards an infinite emitter there is only the field, which takes longer than it saves wherever it
+    /// The method for a scene with such emitters where none is asked for: [`Self::default`] if there is one that a buffer or a neighbourhood
+    /// can be kept for, else [`Self::NONE`]. Towards an infinite emitter there is only the field, which takes longer than it saves wherever it
     /// was measured (`docs/performance.md`).
     #[must_use]
     pub fn for_lights(lights: &[LightShape<'_>]) -> Self {
@@ -140,7 +154,7 @@ pub fn method_table() -> String {
 }
 
 impl Default for Method {
-    /// `amr-xsn`.
+    /// `lb`.
     fn default() -> Self {
         Self::STANDARD
     }
@@ -191,7 +205,7 @@ mod tests {
             }
         }
         assert_eq!("AMR".parse::<Method>(), Err(UnknownMethod));
-        assert_eq!((Method::default().name(), Method::NONE.name()), ("amr-xsn", "none"));
+        assert_eq!((Method::default().name(), Method::NONE.name()), ("lb", "none"));
     }
 
     #[test]

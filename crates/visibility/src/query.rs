@@ -21,11 +21,11 @@ pub struct ShadowQuery {
 /// Which ends of a query lie on an occluder (Def. 2 in \[Houska2013\]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QueryKind {
-    /// Neither end: what fields and neighbourhoods prove.
+    /// Neither end: what all methods prove.
     Spatial,
     /// Only the end on an area light: superficial, but the light's own neighbourhood may prove it (4.4.1).
     OnLight,
-    /// At least the end where light would arrive. Nothing is proved.
+    /// At least the end where light would arrive. Voxels prove nothing, light buffers do.
     Superficial,
 }
 
@@ -122,11 +122,14 @@ impl<R: Recorder> Visibility<'_, R> {
                 counters.on_light += 1;
                 counters.on_light_proved += proved;
             }
-            QueryKind::Superficial => {}
+            QueryKind::Superficial => counters.superficial_proved += proved,
         }
         match answer {
             Answer::Unoccluded => true,
-            Answer::Occluded => false,
+            Answer::Occluded => {
+                counters.proved_occluded += 1;
+                false
+            }
             Answer::Unknown => !self.bvh.occluded(&Segment::new(query.from, query.to)),
         }
     }

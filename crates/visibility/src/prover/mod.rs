@@ -2,6 +2,7 @@
 
 mod area;
 mod field;
+mod light_buffer;
 mod provers;
 
 use vdf_distfield::{ExtendedNeighbourhood, Neighbourhood as _, SafeNeighbourhood};
@@ -10,6 +11,7 @@ pub use area::AreaNeighbourhood;
 pub(crate) use area::{Occluders, Site};
 pub(crate) use field::each_field;
 pub use field::{DistanceField, FieldProver};
+pub use light_buffer::{LightBuffer, LookUp, Refusal};
 pub use provers::Provers;
 
 /// What is known of a closed segment.
@@ -17,7 +19,7 @@ pub use provers::Provers;
 pub enum Answer {
     /// Proved: no occluder meets it.
     Unoccluded,
-    /// Proved: an occluder meets it. None of the thesis's methods ever says so.
+    /// Proved: an occluder meets it. Only light buffers say so, none of the thesis's methods.
     Occluded,
     /// No proof either way.
     Unknown,
@@ -41,16 +43,26 @@ pub enum LightProver {
     Extended(ExtendedNeighbourhood),
     /// The neighbourhood of an area light's voxel box (4.4.1).
     Area(AreaNeighbourhood),
+    /// The light buffer of a point light.
+    Buffer(LightBuffer),
 }
 
 impl LightProver {
     /// The number of voxels of its neighbourhood, if it keeps one.
     pub(crate) fn voxels(&self) -> Option<usize> {
         match self {
-            Self::Field => None,
+            Self::Field | Self::Buffer(_) => None,
             Self::Safe(n) => Some(n.count()),
             Self::Extended(n) => Some(n.count()),
             Self::Area(n) => Some(n.count()),
+        }
+    }
+
+    /// Texels along each side of a face of its light buffer, if it keeps one.
+    pub(crate) fn texels(&self) -> Option<u32> {
+        match self {
+            Self::Buffer(buffer) => Some(buffer.side()),
+            _ => None,
         }
     }
 
@@ -61,6 +73,7 @@ impl LightProver {
             Self::Safe(n) => n.bytes(),
             Self::Extended(n) => n.bytes(),
             Self::Area(n) => n.bytes(),
+            Self::Buffer(buffer) => buffer.bytes(),
         }
     }
 }

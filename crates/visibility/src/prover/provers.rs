@@ -33,8 +33,8 @@ impl Provers {
         Self { grid: None, field: None, lights: Vec::new() }
     }
 
-    pub(crate) const fn new(grid: VoxelGrid, field: Option<FieldProver>, lights: Vec<LightProver>) -> Self {
-        Self { grid: Some(grid), field, lights }
+    pub(crate) const fn new(grid: Option<VoxelGrid>, field: Option<FieldProver>, lights: Vec<LightProver>) -> Self {
+        Self { grid, field, lights }
     }
 
     /// The field, if there is one.
@@ -43,7 +43,7 @@ impl Provers {
         self.field.as_ref()
     }
 
-    /// The grid of the voxels; `None` for the method `none`.
+    /// The grid of the voxels, if there are any.
     #[must_use]
     pub const fn grid(&self) -> Option<&VoxelGrid> {
         self.grid.as_ref()
@@ -55,10 +55,15 @@ impl Provers {
         self.lights.get(emitter)
     }
 
-    /// What is known of the query's closed segment. Never wrong; about a superficial query nothing is known.
+    /// What is known of the query's closed segment. Never wrong; about a superficial query only light buffers know anything.
     #[inline]
     #[must_use]
     pub fn answer(&self, query: &ShadowQuery) -> Answer {
+        if let Some(LightProver::Buffer(buffer)) = self.lights.get(query.emitter)
+            && query.to == buffer.position()
+        {
+            return buffer.answer(query.from);
+        }
         match query.kind {
             QueryKind::Spatial => self.answer_spatial(query.emitter, query.from, query.to),
             QueryKind::OnLight => self.answer_on_light(query.emitter, query.from, query.to),
@@ -79,7 +84,7 @@ impl Provers {
         match light {
             LightProver::Safe(n) => by_neighbourhood(grid, n, from, to),
             LightProver::Extended(n) => by_neighbourhood(grid, n, from, to),
-            LightProver::Field | LightProver::Area(_) => self.answer_between(from, to),
+            LightProver::Field | LightProver::Area(_) | LightProver::Buffer(_) => self.answer_between(from, to),
         }
     }
 
@@ -92,7 +97,7 @@ impl Provers {
     }
 
     /// Checks the field and the neighbourhoods of point lights against the occupied voxels that they were built from. The neighbourhoods
-    /// of area lights, built from fewer occluders, are not looked at.
+    /// of area lights, built from fewer occluders, and light buffers, built from triangles, are not looked at.
     ///
     /// # Errors
     /// The first value that is wrong.
@@ -102,7 +107,7 @@ impl Provers {
             match light {
                 LightProver::Safe(n) => n.validate(occupied)?,
                 LightProver::Extended(n) => n.validate(occupied)?,
-                LightProver::Field | LightProver::Area(_) => {}
+                LightProver::Field | LightProver::Area(_) | LightProver::Buffer(_) => {}
             }
         }
         Ok(())

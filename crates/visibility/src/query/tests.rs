@@ -20,27 +20,35 @@ fn each_question_uses_its_own_proofs() {
     let lamp = Triangle::new(Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 1.0), Vec3::new(0.0, 1.0, 1.0));
     let bvh = Bvh::new(&[wall]);
     let (from, to) = (dvec3(0.25, 0.25, -1.0), dvec3(0.25, 0.25, 0.999));
-    let method = Method::default();
+    let method = "amr-xsn".parse().expect("a method");
     let point = liars(method, LightShape::Point(to), &[]);
+    let buffer = liars(Method::default(), LightShape::Point(to), &[]);
     let area = liars(method, LightShape::Area(&[lamp]), &[lamp]);
-    for (provers, spatial_proof, on_light_proof) in
-        [(&Provers::none(), false, false), (&point, true, false), (&area, false, true)]
-    {
+    for (provers, spatial_proof, on_light_proof, any_proof) in [
+        (&Provers::none(), false, false, false),
+        (&point, true, false, false),
+        (&area, false, true, false),
+        (&buffer, true, true, true),
+    ] {
         let visibility = Visibility::new(&bvh, provers);
-        for (kind, believed) in
-            [(QueryKind::Spatial, spatial_proof), (QueryKind::OnLight, on_light_proof), (QueryKind::Superficial, false)]
-        {
+        for (kind, believed) in [
+            (QueryKind::Spatial, spatial_proof),
+            (QueryKind::OnLight, on_light_proof),
+            (QueryKind::Superficial, any_proof),
+        ] {
             let mut counters = Counters::default();
             let query = ShadowQuery { from, to, emitter: 0, kind };
             assert_eq!(visibility.unoccluded(&query, &mut counters), believed, "{kind:?}");
-            assert_eq!(counters.proved + counters.on_light_proved, u64::from(believed), "{kind:?}");
+            let proved = counters.proved + counters.on_light_proved + counters.superficial_proved;
+            assert_eq!((proved, counters.proved_occluded), (u64::from(believed), 0), "{kind:?}");
             assert_eq!(counters.spatial, u64::from(kind == QueryKind::Spatial), "{kind:?}");
         }
         for (segment_first, spatial) in [(false, false), (true, false), (false, true), (true, true)] {
             let mut counters = Counters::default();
             let visibility = Visibility::new(&bvh, provers).segment_first(segment_first);
             let hit = visibility.intersect_flight(&Segment::new(from, to), spatial, &mut counters);
-            assert_eq!(hit.is_none(), spatial_proof && segment_first && spatial, "{segment_first} {spatial}");
+            let flight_proof = spatial_proof && !any_proof;
+            assert_eq!(hit.is_none(), flight_proof && segment_first && spatial, "{segment_first} {spatial}");
             assert_eq!(counters.flights, u64::from(segment_first && spatial));
         }
     }

@@ -1,0 +1,412 @@
+//! Building a light buffer: from the top, tile by tile.
+//!
+//! A tile of 64 × 64 texels gets the triangles whose bounds on the face meet it. It is quartered down to texels; each part gets those of the
+//! triangles that may meet its rectangle and are not certainly behind what covers it. A texel with a long list is divided
+//! further, twice at most.
+//!
+//! *Guarantee.* The result does not depend on the number of threads. *Cost.* About linear in the texels and in the triangles; while it
+//! builds some 8 bytes a triangle and a megabyte a thread besides the result.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use vdf_geometry::Triangle;
+
+use super::{
+    Entry, LightBuffer, Refusal, Tag, Texel,
+    cone::Cone,
+    frame::{DepthCode, Face, NEVER, Rect, TILE, Window},
+    record::Record,
+    sheets,
+};
+
+/// Texels of a tile.
+pub(super) const TILE_TEXELS: usize = (TILE * TILE) as usize;
+
+/// A list that is longer is divided, if that is possible.
+const LONG: usize = 12;
+
+/// A texel is divided at most so often.
+const DIVISIONS: u32 = 2;
+
+/// Along each side a texel is divided into so many.
+pub(super) const PARTS: u32 = 4;
+
+/// A light that is so many diagonals of the geometry away sees it in a few hundredths of a degree; single precision does not tell its
+/// triangles apart any more.
+const FARTHEST: f64 = 1000.0;
+
+/// What all triangles together say.
+#[derive(Clone, Copy)]
+struct Extent {
+    on_occluder: bool,
+    nearest: f64,
+    farthest: f64,
+    /// For each face the bounds of all triangles on it.
+    faces: [Option<[f64; 4]>; 6],
+}
+
+impl Extent {
+    const NOTHING: Self = Self { on_occluder: false, nearest: f64::INFINITY, farthest: 0.0, faces: [None; 6] };
+
+    fn with(mut self, triangle: &Triangle, light: DVec3) -> Self {
+        let Some(cone) = Cone::new(triangle, light) else {
+            self.on_occluder |= triangle.holds(light);
+            return self;
+        };
+        self.nearest = self.nearest.min(cone.distance());
+        let largest = |v: DVec3| v.abs().max_element();
+        self.farthest = cone.vertices.iter().fold(self.farthest, |far, v| far.max(largest(*v)));
+        for face in Face::ALL {
+            if let Some(bounds) = cone.on(face).bounds() {
+                let of_face = &mut self.faces[face.index()];
+                *of_face = Some(of_face.map_or(bounds, |all| join(all, bounds)));
+            }
+        }
+        self
+    }
+
+    fn and(self, other: Self) -> Self {
+        let mut faces = self.faces;
+        for (all, more) in faces.iter_mut().zip(other.faces) {
+            *all = match (*all, more) {
+                (Some(a), Some(b)) => Some(join(a, b)),
+                (a, b) => a.or(b),
+            };
+        }
+        Self {
+            on_occluder: self.on_occluder | other.on_occluder,
+            nearest: self.nearest.min(other.nearest),
+            farthest: self.farthest.max(other.farthest),
+            faces,
+        }
+    }
+}
+
+fn join(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
+}
+
+/// What was built for one tile, its lists numbered from its own start.
+struct Tile {
+    texels: Vec<Texel>,
+    parts: Vec<Texel>,
+    entries: Vec<Entry>,
+}
+
+impl LightBuffer {
+    /// Builds the buffer of a point light with `side` texels along each side of a face, a power of two of at least 64, which takes at most
+    /// `max_bytes`. Runs on the current rayon pool.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn build(triangles: &[Triangle], light: DVec3, side: u32, max_bytes: u64) -> Result<Self, Refusal> {
+        let side = side.next_power_of_two().max(TILE);
+        let extent = triangles
+            .par_iter()
+            .with_min_len(1024)
+            .fold(|| Extent::NOTHING, |extent, t| extent.with(t, light))
+            .reduce(|| Extent::NOTHING, Extent::and);
+        if extent.on_occluder {
+            return Err(Refusal::OnOccluder);
+        }
+        // Nothing may cost more than its texels: faces are known now.
+        let texels_per_face = u64::from(side) * u64::from(side);
+        let faces = extent.faces.iter().flatten().count() as u64;
+        if faces * texels_per_face * size_of::<Texel>() as u64 > max_bytes || triangles.len() > Tag::MOST {
+            return Err(Refusal::Memory);
+        }
+        let mut first = 0;
+        let windows = extent.faces.map(|bounds| {
+            bounds.map_or(Window::NONE, |bounds| {
+                let window = Window::new(bounds, side, first);
+                first += side * side;
+                window
+            })
+        });
+        let diagonal = vdf_geometry::Bounds::of_triangles(triangles).extent().length();
+        if faces > 0 && extent.nearest > FARTHEST * diagonal {
+            return Err(Refusal::FarAway);
+        }
+        let depths = DepthCode::new(extent.nearest.min(extent.farthest), extent.farthest);
+        let bins = Bins::new(triangles, light, &windows);
+        let tiles: Vec<Tile> = (0..bins.starts.len() - 1)
+            .into_par_iter()
+            .map_init(Vec::new, |scratch, tile| {
+                let (face, x, y) = bins.tile(tile);
+                TileBuilder {
+                    window: &windows[face.index()],
+                    depths: &depths,
+                    cones: Vec::new(),
+                    scratch,
+                    out: Tile::new(),
+                }
+                .build(triangles, light, bins.of(tile), face, x, y)
+            })
+            .collect();
+        let buffer = merge(triangles, light, windows, depths, tiles);
+        if buffer.bytes() as u64 > max_bytes { Err(Refusal::Memory) } else { Ok(buffer) }
+    }
+}
+
+/// The triangles of each tile.
+struct Bins {
+    /// For each tile where its triangles start; one more at the end.
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+    /// The face of each group of tiles, which are rows of `tiles` each.
+    faces: Vec<Face>,
+    tiles: u32,
+}
+
+impl Bins {
+    fn new(triangles: &[Triangle], light: DVec3, windows: &[Window; 6]) -> Self {
+        let faces: Vec<_> = Face::ALL.into_iter().filter(|f| windows[f.index()].side() > 0).collect();
+        let tiles = faces.first().map_or(0, |f| windows[f.index()].side() / TILE);
+        let pairs: Vec<Vec<(u32, u32)>> = triangles
+            .par_chunks(16_384)
+            .enumerate()
+            .map(|(chunk, some)| {
+                let mut pairs = Vec::with_capacity(2 * some.len());
+                for (number, triangle) in (chunk as u32 * 16_384..).zip(some) {
+                    let Some(cone) = Cone::new(triangle, light) else { continue };
+                    for (group, face) in (0..).zip(&faces) {
+                        let cone = cone.on(*face);
+                        let window = &windows[face.index()];
+                        let Some(bounds) = cone.bounds() else { continue };
+                        let [x0, x1, y0, y1] = window.tiles(bounds);
+                        for (x, y) in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (x, y))) {
+                            let size = f64::from(TILE);
+                            let rect = window.rect(f64::from(x) * size, f64::from(y) * size, size);
+                            if (x0, y0) == (x1, y1) || cone.may_meet(&rect) {
+                                pairs.push(((group * tiles + y) * tiles + x, number));
+                            }
+                        }
+                    }
+                }
+                pairs
+            })
+            .collect();
+        let count = faces.len() * (tiles * tiles) as usize;
+        let mut starts = vec![0_u32; count + 1];
+        for (tile, _) in pairs.iter().flatten() {
+            starts[*tile as usize + 1] += 1;
+        }
+        for i in 0..count {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut sorted = vec![0; starts[count] as usize];
+        for (tile, number) in pairs.iter().flatten() {
+            let place = &mut next[*tile as usize];
+            sorted[*place as usize] = *number;
+            *place += 1;
+        }
+        Self { starts, triangles: sorted, faces, tiles }
+    }
+
+    fn of(&self, tile: usize) -> &[u32] {
+        &self.triangles[self.starts[tile] as usize..self.starts[tile + 1] as usize]
+    }
+
+    /// The face of a tile, and its column and row.
+    fn tile(&self, tile: usize) -> (Face, u32, u32) {
+        let tiles = self.tiles as usize;
+        let in_face = tile % (tiles * tiles);
+        (self.faces[tile / (tiles * tiles)], (in_face % tiles) as u32, (in_face / tiles) as u32)
+    }
+}
+
+/// A triangle that may be met in a rectangle.
+#[derive(Clone, Copy)]
+struct Candidate {
+    cone: u32,
+    /// Bounds of its depth there.
+    near: f64,
+    far: f64,
+}
+
+/// Builds one tile.
+struct TileBuilder<'a> {
+    window: &'a Window,
+    depths: &'a DepthCode,
+    /// Of the tile's triangles, in the axes of the face, with their bounds and numbers.
+    cones: Vec<(Cone, [f64; 4], u32)>,
+    /// Candidates of the rectangles that are being divided, the smallest last.
+    scratch: &'a mut Vec<Candidate>,
+    out: Tile,
+}
+
+impl Tile {
+    const fn new() -> Self {
+        Self { texels: Vec::new(), parts: Vec::new(), entries: Vec::new() }
+    }
+}
+
+impl TileBuilder<'_> {
+    fn build(mut self, triangles: &[Triangle], light: DVec3, numbers: &[u32], face: Face, x: u32, y: u32) -> Tile {
+        self.out.texels = vec![Texel::EMPTY; TILE_TEXELS];
+        for &number in numbers {
+            if let Some(cone) = Cone::new(&triangles[number as usize], light).map(|c| c.on(face))
+                && let Some(bounds) = cone.bounds()
+            {
+                self.cones.push((cone, bounds, number));
+            }
+        }
+        self.scratch.clear();
+        self.scratch.extend((0..self.cones.len() as u32).map(|cone| Candidate { cone, near: 0.0, far: 0.0 }));
+        self.divide(x * TILE, y * TILE, TILE, 0);
+        self.out
+    }
+
+    /// Divides a square of texels whose candidates are those from `start`.
+    fn divide(&mut self, x: u32, y: u32, size: u32, start: usize) {
+        let half = size / 2;
+        let end = self.scratch.len();
+        for (x, y) in [(x, y), (x + half, y), (x, y + half), (x + half, y + half)] {
+            let rect = self.window.rect(f64::from(x), f64::from(y), f64::from(half));
+            let covered = self.choose(&rect, start, end);
+            if self.scratch.len() > end {
+                if half > 1 {
+                    self.divide(x, y, half, end);
+                } else {
+                    let texel = self.texel(f64::from(x), f64::from(y), 1.0, 0, end, covered);
+                    self.out.texels[LightBuffer::place_in_tile(x, y)] = texel;
+                }
+            }
+            self.scratch.truncate(end);
+        }
+    }
+
+    /// Puts those of the candidates in `start..end` that may decide something in the rectangle behind them, and says beyond which depth it
+    /// is covered.
+    fn choose(&mut self, rect: &Rect, start: usize, end: usize) -> f64 {
+        let mut covered = f64::INFINITY;
+        let (u0, u1) = (rect.u - rect.half_u, rect.u + rect.half_u);
+        let (v0, v1) = (rect.v - rect.half_v, rect.v + rect.half_v);
+        for i in start..end {
+            let number = self.scratch[i].cone;
+            let (cone, bounds, _) = &self.cones[number as usize];
+            let beside = bounds[0] > u1 || bounds[1] < u0 || bounds[2] > v1 || bounds[3] < v0;
+            if beside || !cone.may_meet(rect) {
+                continue;
+            }
+            let Some([near, far]) = cone.depths(rect) else { continue };
+            if near > covered {
+                continue;
+            }
+            if far < covered && cone.covers(rect) {
+                covered = far;
+            }
+            self.scratch.push(Candidate { cone: number, near, far });
+        }
+        self.drop_behind(end, covered);
+        let members = self.scratch.len() - end;
+        if (2..=sheets::MOST).contains(&members) {
+            let cones = &self.cones;
+            let sheet = self.scratch[end..].iter().map(|c| (&cones[c.cone as usize].0, c.far));
+            let beyond = sheets::covered_beyond(sheet, rect);
+            if beyond < covered {
+                covered = beyond;
+                self.drop_behind(end, covered);
+            }
+        }
+        covered
+    }
+
+    /// Drops the candidates from `start` that are behind what covers their rectangle.
+    fn drop_behind(&mut self, start: usize, covered: f64) {
+        let mut kept = start;
+        for i in start..self.scratch.len() {
+            let candidate = self.scratch[i];
+            if candidate.near <= covered {
+                self.scratch[kept] = candidate;
+                kept += 1;
+            }
+        }
+        self.scratch.truncate(kept);
+    }
+
+    /// The texel of this place and size whose candidates are those from `start`, covered beyond this depth.
+    fn texel(&mut self, x: f64, y: f64, size: f64, divisions: u32, start: usize, covered: f64) -> Texel {
+        let count = self.scratch.len() - start;
+        let occluded = self.depths.upper(covered);
+        let lower = |near| self.depths.lower(near);
+        if let [only] = self.scratch[start..] {
+            let number = self.cones[only.cone as usize].2;
+            return Texel { lit: lower(only.near), occluded, tag: Tag::single(number) };
+        }
+        if count == 0 {
+            return Texel::EMPTY;
+        }
+        let lit = self.scratch[start..].iter().map(|c| lower(c.near)).min().unwrap_or(NEVER);
+        if count > LONG && divisions < DIVISIONS {
+            let first = self.out.parts.len();
+            self.out.parts.resize(first + (PARTS * PARTS) as usize, Texel::EMPTY);
+            let (end, part) = (self.scratch.len(), size / f64::from(PARTS));
+            for i in 0..PARTS * PARTS {
+                let (px, py) = (x + f64::from(i % PARTS) * part, y + f64::from(i / PARTS) * part);
+                let covered = self.choose(&self.window.rect(px, py, part), start, end);
+                let texel = self.texel(px, py, part, divisions + 1, end, covered);
+                self.out.parts[first + i as usize] = texel;
+                self.scratch.truncate(end);
+            }
+            return Texel { lit, occluded, tag: Tag::parts(first) };
+        }
+        let first = self.out.entries.len();
+        let cones = &self.cones;
+        let entry = |c: &Candidate| Entry { triangle: cones[c.cone as usize].2, nearest: lower(c.near), last: 0 };
+        self.out.entries.extend(self.scratch[start..].iter().map(entry));
+        let list = &mut self.out.entries[first..];
+        list.sort_unstable_by_key(|e| (e.nearest, e.triangle));
+        list[count - 1].last = 1;
+        Texel { lit, occluded, tag: Tag::list(first) }
+    }
+}
+
+/// Puts the tiles together: lists one after the other, records of the triangles that occur.
+fn merge(
+    triangles: &[Triangle],
+    light: DVec3,
+    windows: [Window; 6],
+    depths: DepthCode,
+    tiles: Vec<Tile>,
+) -> LightBuffer {
+    let mut occurs = vec![0_u32; triangles.len()];
+    for tile in &tiles {
+        let singles = tile.texels.iter().chain(&tile.parts).filter_map(|t| t.tag.as_single());
+        for number in singles.chain(tile.entries.iter().map(|e| e.triangle)) {
+            occurs[number as usize] = 1;
+        }
+    }
+    let numbers: Vec<u32> = (0..triangles.len() as u32).filter(|&t| occurs[t as usize] == 1).collect();
+    for (record, &number) in (0..).zip(&numbers) {
+        occurs[number as usize] = record;
+    }
+    let record_of = occurs;
+    let records = numbers
+        .par_iter()
+        .filter_map(|&number| Cone::new(&triangles[number as usize], light).map(|cone| Record::new(&cone)))
+        .collect();
+    // The tiles' texels come first, then all that are divided.
+    let mut offsets = Vec::with_capacity(tiles.len());
+    let (mut part, mut entry) = (tiles.len() * TILE_TEXELS, 0);
+    for tile in &tiles {
+        offsets.push((part, entry));
+        part += tile.parts.len();
+        entry += tile.entries.len();
+    }
+    let mut texels = Vec::with_capacity(part);
+    let mut entries = Vec::with_capacity(entry);
+    let moved = |texel: &Texel, (part, entry): (usize, usize)| Texel {
+        tag: texel.tag.moved(&record_of, part, entry),
+        ..*texel
+    };
+    for (tile, offset) in tiles.iter().zip(&offsets) {
+        texels.extend(tile.texels.iter().map(|t| moved(t, *offset)));
+    }
+    for (tile, offset) in tiles.iter().zip(&offsets) {
+        texels.extend(tile.parts.iter().map(|t| moved(t, *offset)));
+        entries.extend(tile.entries.iter().map(|e| Entry { triangle: record_of[e.triangle as usize], ..*e }));
+    }
+    LightBuffer { position: light, windows, depths, texels, entries, records }
+}
