@@ -53,10 +53,14 @@ pub(crate) struct RenderArgs {
     /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
-    /// Acceleration of visibility queries; the image is the same with all [default: amr-xsn, or none in a scene without
+    /// Acceleration of visibility queries; the image is the same with all [default: lb, or none in a scene without
     /// point and area lights and without --segment-first]
     #[arg(long, value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Option<Method>,
+    /// Texels along each side of a face of a light buffer (method lb), rounded up to a power of two [default: auto, about
+    /// as many in all as there are triangles]
+    #[arg(long, value_name = "auto|TEXELS", value_parser = parse_texels)]
+    pub(crate) light_buffer: Option<Texels>,
     /// Side of a voxel in world units [default: a 128th of the longest side of what they cover]
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub(crate) voxel: Option<f64>,
@@ -106,6 +110,17 @@ pub(crate) struct RenderArgs {
     /// No progress and no statistics in words; errors and warnings only
     #[arg(short, long)]
     pub(crate) quiet: bool,
+}
+
+/// The side of a light buffer's faces as typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Texels(pub(crate) Option<u32>);
+
+fn parse_texels(text: &str) -> Result<Texels, String> {
+    match text {
+        "auto" => Ok(Texels(None)),
+        _ => text.parse().map(|n| Texels(Some(n))).map_err(|_| "must be auto or a whole number".to_owned()),
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

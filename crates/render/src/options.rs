@@ -27,6 +27,9 @@ impl TransmittanceEstimator {
     }
 }
 
+/// Texels along each side of a face of a light buffer: at most so many.
+const MOST_TEXELS: u32 = 8192;
+
 /// What a voxel grid covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GridExtent {
@@ -48,6 +51,9 @@ pub struct PrepareOptions {
     pub grid: GridExtent,
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
+    /// Texels along each side of a face of a light buffer, rounded up to a power of two of at least 64; by default about as many in all as
+    /// there are triangles.
+    pub texels: Option<u32>,
     /// Number of threads; by default one for each processor.
     pub threads: Option<usize>,
 }
@@ -55,7 +61,14 @@ pub struct PrepareOptions {
 impl Default for PrepareOptions {
     /// At most 2²⁹ voxels (4 GiB), all else by default.
     fn default() -> Self {
-        Self { method: None, voxel_size: None, grid: GridExtent::Occluders, max_voxels: 1 << 29, threads: None }
+        Self {
+            method: None,
+            voxel_size: None,
+            grid: GridExtent::Occluders,
+            max_voxels: 1 << 29,
+            texels: None,
+            threads: None,
+        }
     }
 }
 
@@ -72,6 +85,9 @@ impl PrepareOptions {
     /// [`RenderError::Option`] names the option and what it has to be.
     pub fn validate(&self) -> Result<(), RenderError> {
         check_threads(self.threads)?;
+        if let Some(texels) = self.texels.filter(|n| !(1..=MOST_TEXELS).contains(n)) {
+            return Err(RenderError::option("light-buffer", format!("must be from 1 to {MOST_TEXELS}, not {texels}")));
+        }
         self.voxel_size.map_or(Ok(()), check_voxel_size)
     }
 }

@@ -74,8 +74,13 @@ impl PreparedScene {
         let bounds = *world.grid_bounds(options.grid);
         let method = options.method.unwrap_or_else(|| Method::for_lights(&lights));
         let build = |method, voxel_size| {
-            let options =
-                ProverOptions { method, voxel_size, max_voxels: options.max_voxels, ..ProverOptions::default() };
+            let options = ProverOptions {
+                method,
+                voxel_size,
+                max_voxels: options.max_voxels,
+                texels: options.texels,
+                ..ProverOptions::default()
+            };
             Provers::build(&options, &world.triangles, bounds, &lights)
         };
         let mut notes = Vec::new();

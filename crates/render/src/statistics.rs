@@ -14,7 +14,7 @@ pub struct Statistics {
     pub version: &'static str,
     /// Method of acceleration.
     pub method: &'static str,
-    /// Side of a voxel in world units; `None` for the method `none`.
+    /// Side of a voxel in world units, if there are voxels.
     pub voxel_size: Option<f64>,
     /// Voxels along x, y and z.
     pub grid: Option<[u32; 3]>,
@@ -64,6 +64,12 @@ pub struct Statistics {
     pub on_light_proved: u64,
     /// on light proved / on light.
     pub p_accelerated_on_light: Option<f64>,
+    /// Superficial queries, from surfaces, that light buffers answered.
+    pub superficial_proved: u64,
+    /// superficial proved / all other queries than those counted above.
+    pub p_accelerated_superficial: Option<f64>,
+    /// Of all queries that were proved those that are occluded; only light buffers say so.
+    pub proved_occluded: u64,
     /// Rays cast for the first occluder.
     pub rays: u64,
     /// Free flights asked for a proof (segment-first).
@@ -74,6 +80,10 @@ pub struct Statistics {
     pub p_accelerated_flights: Option<f64>,
     /// For each emitter of the file, in its order: its neighbourhood, if it has one.
     pub neighbourhoods: Vec<Option<NeighbourhoodSize>>,
+    /// The same for light buffers.
+    pub light_buffers: Vec<Option<BufferSize>>,
+    /// For each emitter why it has not what the method would keep for it; `None` if that is not so.
+    pub fallbacks: Vec<Option<&'static str>>,
     /// Samples left out because they were not finite or negative; must be 0.
     pub refused: u64,
 }
@@ -85,6 +95,15 @@ pub struct NeighbourhoodSize {
     pub voxels: usize,
     /// Their share of the free voxels.
     pub share_of_free: f64,
+}
+
+/// The size of a light buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BufferSize {
+    /// Texels along each side of a face.
+    pub texels: u32,
+    /// Its memory in bytes.
+    pub bytes: usize,
 }
 
 /// A structure that a method built.
@@ -139,11 +158,23 @@ impl Statistics {
             on_light: counters.on_light,
             on_light_proved: counters.on_light_proved,
             p_accelerated_on_light: ratio(counters.on_light_proved, counters.on_light),
+            superficial_proved: counters.superficial_proved,
+            p_accelerated_superficial: ratio(
+                counters.superficial_proved,
+                counters.queries - counters.spatial - counters.on_light,
+            ),
+            proved_occluded: counters.proved_occluded,
             rays: counters.rays,
             flights: counters.flights,
             flights_proved: counters.flights_proved,
             p_accelerated_flights: ratio(counters.flights_proved, counters.flights),
             neighbourhoods: build.lights.iter().map(|l| l.voxels.map(neighbourhood)).collect(),
+            light_buffers: build
+                .lights
+                .iter()
+                .map(|l| l.texels.map(|texels| BufferSize { texels, bytes: l.bytes }))
+                .collect(),
+            fallbacks: build.lights.iter().map(|l| l.fallback).collect(),
             refused: counters.refused,
         }
     }
@@ -157,6 +188,39 @@ fn mebibytes(bytes: usize) -> String {
     format!("{:.2} MiB", bytes as f64 / (1 << 20) as f64)
 }
 
+impl Statistics {
+    /// Lights that are told of one by one; of more there is a summary.
+    const TOLD: usize = 8;
+
+    /// What is kept for each light.
+    fn write_lights(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = self.neighbourhoods.iter().zip(&self.light_buffers).zip(&self.fallbacks);
+        for (i, ((neighbourhood, buffer), fallback)) in all.take(Self::TOLD).enumerate() {
+            if let Some(buffer) = buffer {
+                let BufferSize { texels, bytes } = *buffer;
+                writeln!(f, "emitter {i}      light buffer, {texels} x {texels} texels a face, {}", mebibytes(bytes))?;
+            }
+            if let Some(reason) = fallback {
+                writeln!(f, "emitter {i}      {reason}")?;
+            }
+            if let Some(n) = neighbourhood {
+                let share = percent(Some(n.share_of_free));
+                writeln!(f, "emitter {i}      neighbourhood of {} voxels, {share} of the free ones", n.voxels)?;
+            }
+        }
+        let more = self.fallbacks.len().saturating_sub(Self::TOLD);
+        if more > 0 {
+            let buffers = self.light_buffers.iter().flatten().count();
+            let neighbourhoods = self.neighbourhoods.iter().flatten().count();
+            writeln!(
+                f,
+                "               and {more} more; in all {buffers} light buffers and {neighbourhoods} neighbourhoods"
+            )?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Statistics {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [width, height] = self.size;
@@ -167,22 +231,14 @@ impl fmt::Display for Statistics {
         writeln!(f, ", {} transmittance, {} threads", self.transmittance, self.threads)?;
         write!(f, "method         {}", self.method)?;
         if let (Some([x, y, z]), Some(size)) = (self.grid, self.voxel_size) {
-            writeln!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;
+            write!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;
+        }
+        writeln!(f)?;
+        if !self.build.is_empty() {
             let sizes = self.build.iter().map(|p| format!("{} {}", p.name, mebibytes(p.bytes)));
             writeln!(f, "memory         {}", sizes.collect::<Vec<_>>().join(", "))?;
-        } else {
-            writeln!(f)?;
         }
-        for (i, n) in self.neighbourhoods.iter().enumerate() {
-            if let Some(n) = n {
-                writeln!(
-                    f,
-                    "emitter {i}      neighbourhood of {} voxels, {} of the free ones",
-                    n.voxels,
-                    percent(Some(n.share_of_free))
-                )?;
-            }
-        }
+        self.write_lights(f)?;
         let steps: Vec<_> = self.build.iter().map(|p| format!("{} {:.4}", p.name, p.seconds)).collect();
         let steps = if steps.is_empty() { String::new() } else { format!(" ({})", steps.join(", ")) };
         writeln!(
@@ -205,6 +261,15 @@ impl fmt::Display for Statistics {
                 self.on_light,
                 self.on_light_proved,
                 percent(self.p_accelerated_on_light)
+            )?;
+        }
+        if self.superficial_proved > 0 {
+            write!(
+                f,
+                "\nsurfaces       {} of the queries from surfaces answered ({}); of all answers {} are \"occluded\"",
+                self.superficial_proved,
+                percent(self.p_accelerated_superficial),
+                self.proved_occluded
             )?;
         }
         write!(f, "\nrays           {} cast", self.rays)?;

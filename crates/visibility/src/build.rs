@@ -13,7 +13,7 @@ use vdf_voxel::{Resolution, Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
     AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightBuffer, LightProver, LightShape, Method,
-    PointProver, Provers, VisibilityError,
+    PointProver, Provers, Refusal, VisibilityError,
     prover::{Occluders, Site, each_field},
 };
 
@@ -224,14 +224,23 @@ fn default_texels(triangles: usize, bytes_for_each: u64) -> u32 {
     side
 }
 
+/// What all light buffers together may take at most.
+const BUFFER_BYTES: u64 = 1 << 30;
+
 /// Builds the buffers of all point lights, one after the other, each on all threads, as long as they fit.
 fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[LightShape<'_>], kept: &mut [Kept]) {
     let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count() as u64;
-    let side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), options.max_bytes / count.max(1)));
-    let mut free = options.max_bytes;
+    let mut free = options.max_bytes.min(BUFFER_BYTES);
+    let mut side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), free / count.max(1)));
     for (light, kept) in lights.iter().zip(kept) {
         let LightShape::Point(position) = light else { continue };
-        match LightBuffer::build(triangles, *position, side, free) {
+        let mut built = LightBuffer::build(triangles, *position, side, free);
+        if matches!(built, Err(Refusal::Memory)) && options.texels.is_none() && side > 64 {
+            // Those that come after it have no better chance.
+            side = 64;
+            built = LightBuffer::build(triangles, *position, side, free);
+        }
+        match built {
             Ok(buffer) => {
                 free -= buffer.bytes() as u64;
                 kept.prover = Some(LightProver::Buffer(buffer));

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use crate::LightShape;
+use crate::{LightShape, QueryKind};
 
 /// A distance field with safe zones; the definitions are those of \[Houska2013\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,6 +107,12 @@ impl Method {
         Self::all().filter(|m| m.field().is_some())
     }
 
+    /// `amr-xsn`, which proves the most of them.
+    #[must_use]
+    pub fn best_with_voxels() -> Self {
+        Self::of(FieldKind::Amr, PointProver::Extended)
+    }
+
     /// The method with this field and this prover for point lights; [`Self::NONE`] if there is none.
     #[must_use]
     pub fn of(field: FieldKind, point: PointProver) -> Self {
@@ -133,6 +139,12 @@ impl Method {
     #[must_use]
     pub fn point_prover(self) -> PointProver {
         self.recipe().point
+    }
+
+    /// Whether it ever proves queries of this kind.
+    #[must_use]
+    pub fn proves(self, kind: QueryKind) -> bool {
+        self != Self::NONE && (kind != QueryKind::Superficial || self.point_prover() == PointProver::Buffer)
     }
 
     /// The method for a scene with such emitters where none is asked for: [`Self::default`] if there is one that a buffer or a neighbourhood
@@ -206,6 +218,7 @@ mod tests {
         }
         assert_eq!("AMR".parse::<Method>(), Err(UnknownMethod));
         assert_eq!((Method::default().name(), Method::NONE.name()), ("lb", "none"));
+        assert_eq!(Method::best_with_voxels().name(), "amr-xsn");
     }
 
     #[test]

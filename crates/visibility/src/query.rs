@@ -108,9 +108,28 @@ impl<R: Recorder> Visibility<'_, R> {
         unoccluded
     }
 
+    /// Whether the closed segments of `queries` meet no occluder, each as [`Visibility::unoccluded`] says; `unoccluded` must be as long.
+    pub fn all_unoccluded(&self, queries: &[ShadowQuery], unoccluded: &mut [bool], counters: &mut Counters) {
+        const BATCH: usize = 64;
+        let mut answers = [Answer::Unknown; BATCH];
+        for (queries, unoccluded) in queries.chunks(BATCH).zip(unoccluded.chunks_mut(BATCH)) {
+            let answers = &mut answers[..queries.len()];
+            self.provers.answer_all(queries, answers);
+            for ((query, answer), unoccluded) in queries.iter().zip(answers).zip(unoccluded) {
+                *unoccluded = self.conclude(query, *answer, counters);
+                self.recorder.record(query, *unoccluded);
+            }
+        }
+    }
+
     #[inline]
     fn ask(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
-        let answer = self.provers.answer(query);
+        self.conclude(query, self.provers.answer(query), counters)
+    }
+
+    /// Counts, and asks the hierarchy where nothing is known.
+    #[inline]
+    fn conclude(&self, query: &ShadowQuery, answer: Answer, counters: &mut Counters) -> bool {
         let proved = u64::from(answer != Answer::Unknown);
         counters.queries += 1;
         match query.kind {

@@ -27,10 +27,11 @@ use crate::{
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let options = options(args)?;
     let prepare = PrepareOptions {
-        // Proofs of flights need a method, whatever the lights.
-        method: args.method.or_else(|| args.segment_first.then(Method::default)),
+        // Proofs of flights need a field, whatever the lights.
+        method: args.method.or_else(|| args.segment_first.then(Method::best_with_voxels)),
         voxel_size: args.voxel,
         grid: args.grid.into(),
+        texels: args.light_buffer.and_then(|texels| texels.0),
         threads: args.threads,
         ..PrepareOptions::default()
     };

@@ -58,7 +58,7 @@ fn method_by_default() {
     let sandbox = Sandbox::new();
     for scene in ["cbox_vol2", "cbox_light"] {
         let text = sandbox.render(&[scene, "-o", "fog.exr"]).stdout;
-        assert!(text.contains("method         amr-xsn"), "{text}");
+        assert!(text.contains("method         lb"), "{text}");
     }
 }
 

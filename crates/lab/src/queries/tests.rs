@@ -182,11 +182,13 @@ fn a_replay_measures_all_methods() {
     let mixed = r.p_spatial * r.hierarchy.t_spatial() + (1.0 - r.p_spatial) * other;
     assert!((r.hierarchy.t_query / mixed - 1.0).abs() < 1e-12);
     for m in &r.methods {
-        assert!(m.bytes > 0 && m.t_build > 0.0 && m.proofs.len() == 1);
+        let buffer = m.method == "lb";
+        assert!(m.bytes > 0 && m.t_build > 0.0 && m.proofs.len() == 1 + usize::from(buffer));
         let p = m.spatial().unwrap();
         assert_eq!(p.p_accelerated, p.proved as f64 / spatial.queries as f64);
         assert_eq!(p.unknown_fraction, 1.0 - p.p_accelerated);
-        assert!(p.proved > 0 && p.proved <= spatial.unoccluded, "{} proves more than there is", m.method);
+        assert!(p.proved > 0 && (buffer || p.proved <= spatial.unoccluded), "{} proves more than there is", m.method);
+        assert!(p.t_batch.median > 0.0 && m.speed_up_batches > 0.0);
         assert!(p.t_acc.median > 0.0 && p.t_effective.median > 0.0);
         assert_eq!(p.speed_up, p.t_hierarchy.median / p.t_effective.median);
         assert_eq!(p.pays_from.is_some(), p.speed_up > 1.0);
@@ -217,8 +219,10 @@ fn a_replay_measures_all_methods() {
             .collect(),
         ..stream.clone()
     };
-    let error = replay(&prepared, &superficial, &options, &Quiet).unwrap_err();
+    let of_voxels = ReplayOptions { methods: Method::with_voxels().collect(), ..options.clone() };
+    let error = replay(&prepared, &superficial, &of_voxels, &Quiet).unwrap_err();
     assert!(matches!(error, LabError::NoQueries { .. }), "{error}");
+    assert!(replay(&prepared, &superficial, &options, &Quiet).is_ok(), "a light buffer proves them");
 }
 
 /// Fog that only an area light lights.
@@ -264,7 +268,7 @@ fn proofs_towards_area_lights_are_a_class_of_their_own() {
     assert!(of(1).proved > 0 && of(1).proved <= class.unoccluded && of(1).t_acc.median > 0.0);
     // The render counts the same proofs.
     let options = RenderOptions { spp: Some(3), ..options };
-    let with = PrepareOptions { voxel_size: Some(0.5), ..PrepareOptions::with_method(Method::default()) };
+    let with = PrepareOptions { voxel_size: Some(0.5), ..PrepareOptions::with_method(Method::best_with_voxels()) };
     let all = record_queries(&prepared, &options, u64::MAX, &Quiet).unwrap();
     let replayed = replay(&prepared, &all, &replay_options, &Quiet).unwrap();
     let statistics = prepared.with_options(&with, &Quiet).unwrap().render(&options, &Quiet).unwrap().statistics;
@@ -292,7 +296,8 @@ fn fields_are_dropped_before_others_are_built() {
     }
     let prepared = plain("cbox_vol2", "8");
     let stream = record_queries(&prepared, &options(RAYMARCH, 2), 500, &Quiet).unwrap();
-    let options = ReplayOptions { voxel_sizes: vec![40.0], passes: 1, ..ReplayOptions::default() };
+    let methods = Method::with_voxels().collect();
+    let options = ReplayOptions { methods, voxel_sizes: vec![40.0], passes: 1, ..ReplayOptions::default() };
     let phases = Phases::default();
     replay(&prepared, &stream, &options, &phases).unwrap();
     let seen = phases.0.into_inner().unwrap();

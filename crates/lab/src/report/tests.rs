@@ -60,7 +60,7 @@ fn a_report_without_a_command_line() {
     let integrator = Integrator::raymarch(3);
     let recorded = RenderOptions { integrator, spp: Some(2), ..RenderOptions::default() };
     let stream = record_queries(&prepared, &recorded, 2000, &Quiet).unwrap();
-    let options = ReplayOptions { methods: vec![Method::default()], passes: 1, ..ReplayOptions::default() };
+    let options = ReplayOptions { methods: vec![Method::best_with_voxels()], passes: 1, ..ReplayOptions::default() };
     let report = queries::run("lamp", &prepared, &stream, &options, &Quiet).unwrap();
     let value = |quantity: &str, method: &str| {
         let is = |f: &&Figure| f.quantity == quantity && f.method == method;

@@ -155,6 +155,7 @@ fn verify_in_pool(
                 grid: options.grid,
                 max_voxels: options.max_voxels,
                 threads: options.threads,
+                ..PrepareOptions::default()
             };
             let with_method = prepared.with_options(&options, progress)?;
             with_method.provers().validate(&occupied)?;
@@ -235,7 +236,7 @@ impl Claimant for Provers {
             // A query towards an emitter may have an answer of its own; the one for any two points has to be right as
             // well.
             let of_emitter = query.emitter.map(|emitter| {
-                [QueryKind::Spatial, QueryKind::OnLight]
+                [QueryKind::Spatial, QueryKind::OnLight, QueryKind::Superficial]
                     .map(|kind| self.answer(&ShadowQuery { from, to, emitter, kind }))
             });
             for answer in of_emitter.into_iter().flatten().chain([self.answer_between(from, to)]) {

@@ -43,11 +43,14 @@ pub enum SegmentClass {
     Outside,
     /// An end in an occupied voxel or in one next to it.
     Occupied,
+    /// Towards a point light along the borders and corners of the texels of its light buffer, the seams and the diagonals
+    /// of its cube, from before, on and behind what is met there.
+    Texel,
 }
 
 impl SegmentClass {
     /// All classes.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Random,
         Self::Light,
         Self::Vertex,
@@ -59,6 +62,7 @@ impl SegmentClass {
         Self::Short,
         Self::Outside,
         Self::Occupied,
+        Self::Texel,
     ];
 
     /// The name in reports.
@@ -76,6 +80,7 @@ impl SegmentClass {
             Self::Short => "short",
             Self::Outside => "outside",
             Self::Occupied => "occupied",
+            Self::Texel => "texel",
         }
     }
 }
@@ -145,7 +150,30 @@ impl<'a> Generator<'a> {
                 let p = self.near_occupied(draw);
                 self.onwards(draw, p)
             }
+            SegmentClass::Texel => self.along_texels(draw),
         }
+    }
+
+    fn along_texels(&self, draw: &mut Draw) -> Query {
+        let Some((emitter, q)) = self.light(draw) else { return self.to_emitter(draw) };
+        let step = 2.0 / draw.of(&[64.0, 128.0, 256.0, 1024.0]);
+        let mut d = DVec3::from_array([(); 3].map(|()| {
+            let u = 2.0 * draw.unit() - 1.0;
+            if draw.chance(0.7) { (u / step).round() * step } else { u }
+        }));
+        d[draw.pick(3)] = draw.of(&[1.0, -1.0]);
+        if draw.chance(0.3) {
+            // A seam, or a diagonal of a face.
+            let (i, j) = (draw.pick(3), draw.pick(3));
+            d[i] = d[j].abs().copysign(d[i]);
+        }
+        let d = nudged(draw, d);
+        let reach = self.world.bounds.extent().length();
+        let along = match self.world.bvh.intersect(&Segment::new(q, q + d * reach)) {
+            Some(hit) => hit.t * draw.of(&[1.0, 1.0, 1.0 - 1e-12, 1.0 + 1e-12, 1.0 - 1e-4, 1.0 + 1e-4, 0.5, 1.5]),
+            None => draw.unit(),
+        };
+        Query { segment: Segment::new(nudged(draw, q + d * (reach * along)), q), emitter: Some(emitter) }
     }
 
     fn to_emitter(&self, draw: &mut Draw) -> Query {

@@ -90,12 +90,14 @@ pub struct MethodReplay {
     /// How many times faster the mixture of all queries of the stream is than by the hierarchy alone; below 1 it is
     /// slower.
     pub speed_up_all: f64,
+    /// The same for queries that are asked in batches of 256.
+    pub speed_up_batches: f64,
 }
 
 /// A method and the queries of one class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProofReplay {
-    /// The class, [`QueryKind::Spatial`] or [`QueryKind::OnLight`].
+    /// The class.
     pub kind: QueryKind,
     /// Queries that were proved.
     pub proved: usize,
@@ -107,6 +109,8 @@ pub struct ProofReplay {
     pub t_acc: Timing,
     /// A query: the proof, and the fallback where there is none.
     pub t_effective: Timing,
+    /// A query of those that are asked in batches of 256.
+    pub t_batch: Timing,
     /// `t_acc` as the thesis computes it (6.3.2), from the whole: t_eff − (1 − p_acc)·t_query. Larger than
     /// [`Self::t_acc`] where proofs alone overlap in the processor but a fallback has to wait for its proof; smaller
     /// where proved queries are the expensive ones.

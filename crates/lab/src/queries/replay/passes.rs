@@ -15,7 +15,7 @@ impl Checked {
         let n = match kind {
             QueryKind::Spatial => self.0.proved,
             QueryKind::OnLight => self.0.on_light_proved,
-            QueryKind::Superficial => 0,
+            QueryKind::Superficial => self.0.superficial_proved,
         };
         n as usize
     }
@@ -55,6 +55,22 @@ pub(super) fn query_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery]) -
     let mut unoccluded = 0;
     for q in queries {
         unoccluded += usize::from(visibility.unoccluded(black_box(q), &mut counters));
+    }
+    black_box(counters);
+    (start.elapsed().as_secs_f64(), unoccluded)
+}
+
+/// One pass over queries as a render asks them that has many at once, `batch` at a time: its seconds, and how many are
+/// unoccluded.
+pub(super) fn batch_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery], batch: usize) -> (f64, usize) {
+    let mut answers = vec![false; batch];
+    let start = Instant::now();
+    let mut counters = Counters::default();
+    let mut unoccluded = 0;
+    for queries in queries.chunks(batch) {
+        let answers = &mut answers[..queries.len()];
+        visibility.all_unoccluded(black_box(queries), answers, &mut counters);
+        unoccluded += answers.iter().filter(|&&a| a).count();
     }
     black_box(counters);
     (start.elapsed().as_secs_f64(), unoccluded)

@@ -10,7 +10,7 @@ use vdf_visibility::{Method, Provers, QueryKind, ShadowQuery, Visibility};
 use super::{
     ReplayOptions,
     figures::{ClassReplay, HierarchyReplay, MethodReplay, ProofReplay, Replay, TimerInfluence, Timing, WrongAnswer},
-    passes::{Checked, check, empty_pass, proof_pass, query_pass, timer_pass},
+    passes::{Checked, batch_pass, check, empty_pass, proof_pass, query_pass, timer_pass},
 };
 use crate::{
     LabError,
@@ -18,11 +18,11 @@ use crate::{
     queries::QueryStream,
 };
 
-/// All classes, those first that methods can prove.
+/// All classes, those first that most methods can prove.
 const CLASSES: [QueryKind; 3] = [QueryKind::Spatial, QueryKind::OnLight, QueryKind::Superficial];
 
-/// How many of them methods can prove.
-const PROVABLE: usize = 2;
+/// Queries that are asked together.
+const BATCH: usize = 256;
 
 /// The queries of one class, in the order of the stream.
 struct Class {
@@ -48,8 +48,10 @@ struct Candidate {
     prepared: PreparedScene,
     checked: Checked,
     /// Nanoseconds a query of each class, for each pass: proofs alone, and whole queries.
-    acc: [Vec<f64>; PROVABLE],
-    effective: [Vec<f64>; PROVABLE],
+    acc: [Vec<f64>; CLASSES.len()],
+    effective: [Vec<f64>; CLASSES.len()],
+    /// The same in batches.
+    batch: [Vec<f64>; CLASSES.len()],
 }
 
 /// Passes that do not depend on a method.
@@ -80,10 +82,6 @@ impl<'a> Replaying<'a> {
             Class { kind, queries: of_kind().map(|(q, _)| *q).collect(), unoccluded }
         };
         let classes: Vec<Class> = CLASSES.map(class).into_iter().filter(|c| !c.queries.is_empty()).collect();
-        if classes.first().is_none_or(|c| c.kind == QueryKind::Superficial) {
-            let help = "only queries from a medium can be proved; record more, or those of raymarch";
-            return Err(LabError::NoQueries { kind: "provable", help });
-        }
         Ok(Self { stream, prepared, progress, classes, truth })
     }
 
@@ -97,6 +95,10 @@ impl<'a> Replaying<'a> {
             if m != Method::NONE && !methods.contains(&m) {
                 methods.push(m);
             }
+        }
+        if !self.classes.iter().any(|c| methods.iter().any(|m| m.proves(c.kind))) {
+            let help = "voxels prove only queries from a medium; record more, those of raymarch, or replay lb";
+            return Err(LabError::NoQueries { kind: "provable", help });
         }
         self.progress.work_total(sizes.len() as u64 * (u64::from(options.passes) + 1) * methods.len() as u64);
         let mut common = Common::default();
@@ -147,6 +149,7 @@ impl<'a> Replaying<'a> {
             grid: options.grid,
             max_voxels: options.max_voxels,
             threads: options.threads,
+            ..PrepareOptions::default()
         };
         let prepared = self.prepared.with_options(&options, &Part(self.progress))?;
         let checked = check(&prepared.visibility(), &self.stream.queries, &self.truth)
@@ -157,11 +160,13 @@ impl<'a> Replaying<'a> {
             checked,
             acc: array::from_fn(|_| vec![]),
             effective: array::from_fn(|_| vec![]),
+            batch: array::from_fn(|_| vec![]),
         })
     }
 
-    fn provable(&self) -> impl Iterator<Item = (usize, &Class)> {
-        self.classes.iter().enumerate().filter(|(_, class)| class.kind != QueryKind::Superficial)
+    /// The classes that a method can prove; those before come first.
+    fn provable(&self, method: Method) -> impl Iterator<Item = (usize, &Class)> {
+        self.classes.iter().enumerate().filter(move |(_, class)| method.proves(class.kind))
     }
 
     fn common_passes(&self, common: &mut Common, passes: u32) -> Result<(), LabError> {
@@ -183,14 +188,16 @@ impl<'a> Replaying<'a> {
 
     fn method_passes(&self, candidates: &mut [Candidate], backwards: bool) -> Result<(), LabError> {
         let turn = |c: &mut Candidate| {
-            let Candidate { method, prepared, checked, acc, effective } = c;
-            for (i, class) in self.provable() {
+            let Candidate { method, prepared, checked, acc, effective, batch } = c;
+            for (i, class) in self.provable(*method) {
                 look(self.progress)?;
                 let (seconds, proved) = proof_pass(prepared.provers(), &class.queries);
                 agrees(*method, proved, checked.proved(class.kind))?;
                 acc[i].push(1e9 * seconds / class.queries.len() as f64);
                 let pass = query_pass(&prepared.visibility(), &class.queries);
                 effective[i].push(class.per_query(*method, pass)?);
+                let pass = batch_pass(&prepared.visibility(), &class.queries, BATCH);
+                batch[i].push(class.per_query(*method, pass)?);
             }
             self.progress.work_done(1);
             Ok(())
@@ -207,7 +214,7 @@ impl<'a> Replaying<'a> {
         let build = c.prepared.build_report();
         let t_build = build.seconds();
         let proofs: Vec<_> = self
-            .provable()
+            .provable(c.method)
             .map(|(i, class)| {
                 let (t_acc, t_effective, t_hierarchy) =
                     (Timing::of(&c.acc[i]), Timing::of(&c.effective[i]), hierarchy[i]);
@@ -221,6 +228,7 @@ impl<'a> Replaying<'a> {
                     unknown_fraction: 1.0 - p,
                     t_acc,
                     t_effective,
+                    t_batch: Timing::of(&c.batch[i]),
                     t_acc_derived: t_effective.median - (1.0 - p) * t_hierarchy.median,
                     t_hierarchy,
                     speed_up: t_hierarchy.median / t_effective.median,
@@ -231,6 +239,7 @@ impl<'a> Replaying<'a> {
             .collect();
         let alone = self.mixed(|i| hierarchy[i].median);
         let with = self.mixed(|i| proofs.get(i).map_or(hierarchy[i].median, |p| p.t_effective.median));
+        let in_batches = self.mixed(|i| proofs.get(i).map_or(hierarchy[i].median, |p| p.t_batch.median));
         MethodReplay {
             method: c.method.name(),
             voxel_size: size,
@@ -239,6 +248,7 @@ impl<'a> Replaying<'a> {
             t_build,
             proofs,
             speed_up_all: alone / with,
+            speed_up_batches: alone / in_batches,
         }
     }
 
@@ -319,6 +329,6 @@ mod tests {
         assert_eq!(places, [vec![0, 2], vec![1, 4], vec![3]]);
         assert_eq!(groups[0][1].1.field(), Some(FieldKind::Amr));
         let all: Vec<Method> = Method::proving().collect();
-        assert_eq!(by_field(&all).len(), 4);
+        assert_eq!(by_field(&all).len(), 5, "those without a field, too");
     }
 }

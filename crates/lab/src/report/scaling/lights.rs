@@ -36,7 +36,7 @@ fn position(i: u32) -> [f64; 3] {
 }
 
 pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
-    let (none, sn, xsn) = (Method::NONE, method("amr-sn"), Method::default());
+    let (none, sn, xsn) = (Method::NONE, method("amr-sn"), Method::best_with_voxels());
     let neighbourhoods = [("sn", "amr-sn"), ("xsn", "amr-xsn")];
     let mut build = Group::new("Time to build all neighbourhoods", Unit::Seconds, &neighbourhoods);
     let mut memory = Group::new("Memory of all neighbourhoods", Unit::Bytes, &neighbourhoods);

@@ -25,7 +25,7 @@ pub(super) fn sizes(most: usize) -> Vec<usize> {
 const FIELDS: [(&str, &str); 4] = [("ndf", "ndf"), ("amr", "amr-xsn"), ("dsz", "dsz"), ("dual", "dual")];
 
 pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
-    let xsn = Method::default();
+    let xsn = Method::best_with_voxels();
     let mut time = Group::new(
         "Time",
         Unit::Seconds,

@@ -144,7 +144,7 @@ impl Curves {
             let name = field.name().split('-').next().unwrap_or_default();
             build.push(name, x, &builds.seconds(field, FIELD));
         }
-        let xsn = Method::default();
+        let xsn = Method::best_with_voxels();
         build.push("xsn", x, &builds.seconds(xsn, NEIGHBOURHOODS));
         memory.push("amr-xsn, all", x, &[builds.all_bytes(xsn)]);
 

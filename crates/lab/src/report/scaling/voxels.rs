@@ -24,7 +24,7 @@ pub(super) fn sizes(most: u32) -> Vec<u64> {
 
 pub(super) fn run(lab: &Lab<'_>) -> Result<Sweep, LabError> {
     let built = methods(BUILT);
-    let (sn, xsn) = (method("amr-sn"), Method::default());
+    let (sn, xsn) = (method("amr-sn"), Method::best_with_voxels());
     let structures =
         [("ndf", "ndf"), ("amr", "amr"), ("dsz", "dsz"), ("dual", "dual"), ("sn", "amr-sn"), ("xsn", "amr-xsn")];
     let with = |first: &'static str| [&[(first, "")], &structures[..]].concat();

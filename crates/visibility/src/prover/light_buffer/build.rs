@@ -2,10 +2,13 @@
 //!
 //! A tile of 64 × 64 texels gets the triangles whose bounds on the face meet it. It is quartered down to texels; each part gets those of the
 //! triangles that may meet its rectangle and are not certainly behind what covers it. A texel with a long list is divided
-//! further, twice at most.
+//! further, twice at most, where that makes the lists shorter.
 //!
 //! *Guarantee.* The result does not depend on the number of threads. *Cost.* About linear in the texels and in the triangles; while it
-//! builds some 8 bytes a triangle and a megabyte a thread besides the result.
+//! builds some 8 bytes a triangle and a megabyte a thread besides the result. Where thousands of triangles lie behind each other in every
+//! direction lists would be without bound; then it stops at the limit of memory.
+
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -129,6 +132,8 @@ impl LightBuffer {
         }
         let depths = DepthCode::new(extent.nearest.min(extent.farthest), extent.farthest);
         let bins = Bins::new(triangles, light, &windows);
+        let spent = AtomicU64::new(faces * texels_per_face * size_of::<Texel>() as u64);
+        let budget = Budget { spent: &spent, max_bytes };
         let tiles: Vec<Tile> = (0..bins.starts.len() - 1)
             .into_par_iter()
             .map_init(Vec::new, |scratch, tile| {
@@ -139,10 +144,14 @@ impl LightBuffer {
                     cones: Vec::new(),
                     scratch,
                     out: Tile::new(),
+                    budget,
                 }
                 .build(triangles, light, bins.of(tile), face, x, y)
             })
             .collect();
+        if budget.exceeded() {
+            return Err(Refusal::Memory);
+        }
         let buffer = merge(triangles, light, windows, depths, tiles);
         if buffer.bytes() as u64 > max_bytes { Err(Refusal::Memory) } else { Ok(buffer) }
     }
@@ -234,6 +243,26 @@ struct TileBuilder<'a> {
     /// Candidates of the rectangles that are being divided, the smallest last.
     scratch: &'a mut Vec<Candidate>,
     out: Tile,
+    budget: Budget<'a>,
+}
+
+/// The memory that all tiles take together.
+#[derive(Clone, Copy)]
+struct Budget<'a> {
+    spent: &'a AtomicU64,
+    max_bytes: u64,
+}
+
+impl Budget<'_> {
+    /// Takes so many bytes, of which there may be too few.
+    fn spend(self, bytes: usize) {
+        self.spent.fetch_add(bytes as u64, Ordering::Relaxed);
+    }
+
+    /// Whether more was taken than there is: then all that is built will be thrown away.
+    fn exceeded(self) -> bool {
+        self.spent.load(Ordering::Relaxed) > self.max_bytes
+    }
 }
 
 impl Tile {
@@ -260,6 +289,9 @@ impl TileBuilder<'_> {
 
     /// Divides a square of texels whose candidates are those from `start`.
     fn divide(&mut self, x: u32, y: u32, size: u32, start: usize) {
+        if self.budget.exceeded() {
+            return;
+        }
         let half = size / 2;
         let end = self.scratch.len();
         for (x, y) in [(x, y), (x + half, y), (x, y + half), (x + half, y + half)] {
@@ -339,19 +371,13 @@ impl TileBuilder<'_> {
             return Texel::EMPTY;
         }
         let lit = self.scratch[start..].iter().map(|c| lower(c.near)).min().unwrap_or(NEVER);
-        if count > LONG && divisions < DIVISIONS {
-            let first = self.out.parts.len();
-            self.out.parts.resize(first + (PARTS * PARTS) as usize, Texel::EMPTY);
-            let (end, part) = (self.scratch.len(), size / f64::from(PARTS));
-            for i in 0..PARTS * PARTS {
-                let (px, py) = (x + f64::from(i % PARTS) * part, y + f64::from(i / PARTS) * part);
-                let covered = self.choose(&self.window.rect(px, py, part), start, end);
-                let texel = self.texel(px, py, part, divisions + 1, end, covered);
-                self.out.parts[first + i as usize] = texel;
-                self.scratch.truncate(end);
-            }
+        if count > LONG
+            && divisions < DIVISIONS
+            && let Some(first) = self.parts(x, y, size, divisions, start)
+        {
             return Texel { lit, occluded, tag: Tag::parts(first) };
         }
+        self.budget.spend(count * size_of::<Entry>());
         let first = self.out.entries.len();
         let cones = &self.cones;
         let entry = |c: &Candidate| Entry { triangle: cones[c.cone as usize].2, nearest: lower(c.near), last: 0 };
@@ -360,6 +386,34 @@ impl TileBuilder<'_> {
         list.sort_unstable_by_key(|e| (e.nearest, e.triangle));
         list[count - 1].last = 1;
         Texel { lit, occluded, tag: Tag::list(first) }
+    }
+}
+
+impl TileBuilder<'_> {
+    /// Divides a texel whose candidates are those from `start`: the first of its parts, or `None` if their lists would hardly be shorter.
+    fn parts(&mut self, x: f64, y: f64, size: f64, divisions: u32, start: usize) -> Option<usize> {
+        const COUNT: usize = (PARTS * PARTS) as usize;
+        let (end, part) = (self.scratch.len(), size / f64::from(PARTS));
+        let places = (0..PARTS * PARTS).map(|i| (x + f64::from(i % PARTS) * part, y + f64::from(i / PARTS) * part));
+        let mut kept = 0;
+        for (px, py) in places.clone() {
+            self.choose(&self.window.rect(px, py, part), start, end);
+            kept += self.scratch.len() - end;
+            self.scratch.truncate(end);
+        }
+        if kept > COUNT * (end - start) / 2 || self.budget.exceeded() {
+            return None;
+        }
+        self.budget.spend(COUNT * size_of::<Texel>());
+        let first = self.out.parts.len();
+        self.out.parts.resize(first + COUNT, Texel::EMPTY);
+        for (i, (px, py)) in places.enumerate() {
+            let covered = self.choose(&self.window.rect(px, py, part), start, end);
+            let texel = self.texel(px, py, part, divisions + 1, end, covered);
+            self.out.parts[first + i] = texel;
+            self.scratch.truncate(end);
+        }
+        Some(first)
     }
 }
 

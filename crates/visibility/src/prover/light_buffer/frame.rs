@@ -24,18 +24,14 @@ pub(super) struct Face(usize);
 impl Face {
     pub(super) const ALL: [Self; 6] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
 
-    /// The face of a direction: that of its largest component.
+    /// The face of a direction: that of its largest component. Any face for what is no number.
     #[inline]
     pub(super) fn of(d: DVec3) -> Self {
         let a = d.abs();
-        let axis = if a.x >= a.y {
-            if a.x >= a.z { 0 } else { 2 }
-        } else if a.y >= a.z {
-            1
-        } else {
-            2
-        };
-        Self(2 * axis + usize::from(d[axis] < 0.0))
+        // Selections, not branches, which would be taken at random.
+        let of_two = usize::from(a.y > a.x);
+        let axis = if a.z > a.x.max(a.y) { 2 } else { of_two };
+        Self(2 * axis + usize::from(d.to_array()[axis] < 0.0))
     }
 
     #[inline]
@@ -47,11 +43,11 @@ impl Face {
     #[inline]
     pub(super) fn local(self, d: DVec3) -> DVec3 {
         let w = if self.0 & 1 == 0 { 1.0 } else { -1.0 };
-        match self.0 >> 1 {
-            0 => DVec3::new(d.y, d.z, w * d.x),
-            1 => DVec3::new(d.z, d.x, w * d.y),
-            _ => DVec3::new(d.x, d.y, w * d.z),
-        }
+        let [x, y, z] = d.to_array();
+        // In cyclic order from any axis.
+        let cycle = [x, y, z, x, y];
+        let axis = (self.0 >> 1).min(2);
+        DVec3::new(cycle[axis + 1], cycle[axis + 2], w * cycle[axis])
     }
 }
 

@@ -81,7 +81,7 @@ pub struct LookUp {
 
 /// What is known of a pyramid of directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Texel {
+pub(super) struct Texel {
     /// A query with a lower code meets nothing.
     lit: u16,
     /// A query with this code or a higher one is occluded.
@@ -90,7 +90,7 @@ struct Texel {
 }
 
 impl Texel {
-    const EMPTY: Self = Self { lit: NEVER, occluded: NEVER, tag: Tag(0) };
+    pub(super) const EMPTY: Self = Self { lit: NEVER, occluded: NEVER, tag: Tag(0) };
 }
 
 /// What decides the other queries: two bits of kind and a number.
@@ -154,8 +154,8 @@ struct Entry {
 }
 
 /// A query's place: what comparisons and tests need of it.
-#[derive(Clone, Copy)]
-struct Place {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
     d: DVec3,
     w: f64,
     inverse_w: f64,
@@ -201,14 +201,20 @@ impl LightBuffer {
     #[must_use]
     pub fn look_up(&self, from: DVec3) -> LookUp {
         match self.place(from) {
-            Ok(place) => self.decide(&place, self.texels[place.texel]),
+            Ok(place) => self.decide(&place, self.texel(&place)),
             Err(answer) => LookUp { answer, tests: 0 },
         }
     }
 
+    /// The texel of a place. Nothing else of a look-up waits for memory where comparisons decide.
+    #[inline]
+    pub(super) fn texel(&self, place: &Place) -> Texel {
+        self.texels[place.texel]
+    }
+
     /// The place of a query, or its answer if it has none.
     #[inline]
-    fn place(&self, from: DVec3) -> Result<Place, Answer> {
+    pub(super) fn place(&self, from: DVec3) -> Result<Place, Answer> {
         let d = from - self.position;
         let face = Face::of(d);
         let local = face.local(d);
@@ -237,7 +243,7 @@ impl LightBuffer {
 
     /// The answer at a place.
     #[inline]
-    fn decide(&self, place: &Place, texel: Texel) -> LookUp {
+    pub(super) fn decide(&self, place: &Place, texel: Texel) -> LookUp {
         if place.code < texel.lit {
             LookUp { answer: Answer::Unoccluded, tests: 0 }
         } else if place.code >= texel.occluded {

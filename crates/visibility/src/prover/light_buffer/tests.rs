@@ -204,3 +204,15 @@ fn it_is_the_same_for_any_number_of_threads() {
     assert!(one.entries.iter().any(|e| e.last == 1), "it has lists");
     assert!(one.texels.iter().any(|t| t.tag.kind() == 2), "it has parts");
 }
+
+/// Triangles behind each other in every direction, whose lists nothing makes shorter: refused, and soon.
+#[test]
+fn memory_is_bounded_before_it_is_taken() {
+    let room = walls(Vec3::NEG_ONE, Vec3::ONE, 1);
+    let many: Vec<_> = (0..400).flat_map(|_| room.clone()).collect();
+    let build = |max_bytes| LightBuffer::build(&many, dvec3(0.1, 0.2, 0.3), 64, max_bytes);
+    assert_eq!(build(10 << 20).err(), Some(Refusal::Memory));
+    let buffer = build(1 << 30).expect("it fits");
+    let parts = buffer.texels.iter().filter(|t| t.tag.kind() == 2).count();
+    assert!(parts * 20 < buffer.texels.len(), "nearly all parts would have the same lists, not {parts} others");
+}
