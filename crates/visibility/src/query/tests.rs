@@ -53,3 +53,49 @@ fn each_question_uses_its_own_proofs() {
         }
     }
 }
+
+/// A buffer knows ways to its own light and to nothing else.
+#[test]
+fn a_buffer_answers_for_its_own_light_alone() {
+    let light = dvec3(0.25, 0.25, 1.0);
+    let provers = liars(Method::default(), LightShape::Point(light), &[]);
+    let answer =
+        |to, emitter| provers.answer(&ShadowQuery { from: DVec3::ZERO, to, emitter, kind: QueryKind::Spatial });
+    assert_eq!(answer(light, 0), Answer::Unoccluded);
+    assert_eq!(answer(light.with_x(0.25_f64.next_up()), 0), Answer::Unknown);
+    assert_eq!(answer(light, 1), Answer::Unknown);
+}
+
+/// Many queries at once are answered as one by one, whatever lights, kinds and provers they mix, and whatever their number.
+#[test]
+fn batches_are_answered_as_single_queries() {
+    let wall = Triangle::new(Vec3::new(-1.0, -1.0, 0.5), Vec3::new(1.0, -1.0, 0.5), Vec3::new(0.0, 1.0, 0.5));
+    let lights = [dvec3(0.0, 0.0, 1.0), dvec3(0.5, 0.25, -1.0)];
+    let bvh = Bvh::new(&[wall]);
+    let bounds = Bounds::new(DVec3::splat(-2.0), DVec3::splat(2.0));
+    for name in ["none", "amr-sn", "lb"] {
+        let options =
+            ProverOptions { method: name.parse().expect("a method"), voxel_size: 0.25, ..ProverOptions::default() };
+        let shapes = [LightShape::Point(lights[0]), LightShape::Point(lights[1]), LightShape::Infinite];
+        let provers = Provers::build(&options, &[wall], bounds, &shapes).expect("a sound grid").0;
+        let visibility = Visibility::new(&bvh, &provers);
+        let mut random = fastrand::Rng::with_seed(1);
+        let queries: Vec<_> = (0..1000)
+            .map(|i| ShadowQuery {
+                from: DVec3::from_array([(); 3].map(|()| 4.0 * random.f64() - 2.0)),
+                to: lights.get(i % 3).copied().unwrap_or(DVec3::splat(5.0)),
+                emitter: i % 4,
+                kind: [QueryKind::Spatial, QueryKind::OnLight, QueryKind::Superficial][i / 4 % 3],
+            })
+            .collect();
+        let (mut one_by_one, mut counters) = (Vec::new(), Counters::default());
+        one_by_one.extend(queries.iter().map(|q| visibility.unoccluded(q, &mut counters)));
+        for size in [1, 7, 16, 64, 100, 256, 1000] {
+            let (mut together, mut of_batches) = (vec![false; 1000], Counters::default());
+            for (queries, answers) in queries.chunks(size).zip(together.chunks_mut(size)) {
+                visibility.all_unoccluded(queries, answers, &mut of_batches);
+            }
+            assert_eq!((&together, of_batches), (&one_by_one, counters), "{name}, {size}");
+        }
+    }
+}

@@ -142,6 +142,8 @@ impl LightBuffer {
                     window: &windows[face.index()],
                     depths: &depths,
                     cones: Vec::new(),
+                    bounds: Vec::new(),
+                    numbers: Vec::new(),
                     scratch,
                     out: Tile::new(),
                     budget,
@@ -238,8 +240,10 @@ struct Candidate {
 struct TileBuilder<'a> {
     window: &'a Window,
     depths: &'a DepthCode,
-    /// Of the tile's triangles, in the axes of the face, with their bounds and numbers.
-    cones: Vec<(Cone, [f64; 4], u32)>,
+    /// Of the tile's triangles: in the axes of the face, their bounds there, their numbers.
+    cones: Vec<Cone>,
+    bounds: Vec<[f64; 4]>,
+    numbers: Vec<u32>,
     /// Candidates of the rectangles that are being divided, the smallest last.
     scratch: &'a mut Vec<Candidate>,
     out: Tile,
@@ -278,7 +282,9 @@ impl TileBuilder<'_> {
             if let Some(cone) = Cone::new(&triangles[number as usize], light).map(|c| c.on(face))
                 && let Some(bounds) = cone.bounds()
             {
-                self.cones.push((cone, bounds, number));
+                self.cones.push(cone);
+                self.bounds.push(bounds);
+                self.numbers.push(number);
             }
         }
         self.scratch.clear();
@@ -296,9 +302,11 @@ impl TileBuilder<'_> {
         let end = self.scratch.len();
         for (x, y) in [(x, y), (x + half, y), (x, y + half), (x + half, y + half)] {
             let rect = self.window.rect(f64::from(x), f64::from(y), f64::from(half));
-            let covered = self.choose(&rect, start, end);
+            let covered = self.choose(&rect, start, end, half == 1);
             if self.scratch.len() > end {
-                if half > 1 {
+                if self.scratch.len() == end + 1 && covered < f64::INFINITY {
+                    self.fill(x, y, half, self.scratch[end].cone);
+                } else if half > 1 {
                     self.divide(x, y, half, end);
                 } else {
                     let texel = self.texel(f64::from(x), f64::from(y), 1.0, 0, end, covered);
@@ -309,17 +317,31 @@ impl TileBuilder<'_> {
         }
     }
 
+    /// Fills a square of texels that one triangle covers, behind which nothing matters.
+    fn fill(&mut self, x: u32, y: u32, size: u32, cone: u32) {
+        let (cone, tag) = (&self.cones[cone as usize], Tag::single(self.numbers[cone as usize]));
+        for (x, y) in (y..y + size).flat_map(|y| (x..x + size).map(move |x| (x, y))) {
+            if let Some([near, far]) = cone.depths(&self.window.rect(f64::from(x), f64::from(y), 1.0)) {
+                self.out.texels[LightBuffer::place_in_tile(x, y)] =
+                    Texel { lit: self.depths.lower(near), occluded: self.depths.upper(far), tag };
+            }
+        }
+    }
+
     /// Puts those of the candidates in `start..end` that may decide something in the rectangle behind them, and says beyond which depth it
     /// is covered.
-    fn choose(&mut self, rect: &Rect, start: usize, end: usize) -> f64 {
+    fn choose(&mut self, rect: &Rect, start: usize, end: usize, single_texel: bool) -> f64 {
         let mut covered = f64::INFINITY;
         let (u0, u1) = (rect.u - rect.half_u, rect.u + rect.half_u);
         let (v0, v1) = (rect.v - rect.half_v, rect.v + rect.half_v);
         for i in start..end {
             let number = self.scratch[i].cone;
-            let (cone, bounds, _) = &self.cones[number as usize];
-            let beside = bounds[0] > u1 || bounds[1] < u0 || bounds[2] > v1 || bounds[3] < v0;
-            if beside || !cone.may_meet(rect) {
+            let bounds = &self.bounds[number as usize];
+            if bounds[0] > u1 || bounds[1] < u0 || bounds[2] > v1 || bounds[3] < v0 {
+                continue;
+            }
+            let cone = &self.cones[number as usize];
+            if !cone.may_meet(rect) {
                 continue;
             }
             let Some([near, far]) = cone.depths(rect) else { continue };
@@ -333,9 +355,10 @@ impl TileBuilder<'_> {
         }
         self.drop_behind(end, covered);
         let members = self.scratch.len() - end;
-        if (2..=sheets::MOST).contains(&members) {
+        // Where one triangle covers all, a sheet in front of it is left to the texels.
+        if (2..=sheets::MOST).contains(&members) && (covered == f64::INFINITY || single_texel) {
             let cones = &self.cones;
-            let sheet = self.scratch[end..].iter().map(|c| (&cones[c.cone as usize].0, c.far));
+            let sheet = self.scratch[end..].iter().map(|c| (&cones[c.cone as usize], c.far));
             let beyond = sheets::covered_beyond(sheet, rect);
             if beyond < covered {
                 covered = beyond;
@@ -364,7 +387,7 @@ impl TileBuilder<'_> {
         let occluded = self.depths.upper(covered);
         let lower = |near| self.depths.lower(near);
         if let [only] = self.scratch[start..] {
-            let number = self.cones[only.cone as usize].2;
+            let number = self.numbers[only.cone as usize];
             return Texel { lit: lower(only.near), occluded, tag: Tag::single(number) };
         }
         if count == 0 {
@@ -379,8 +402,8 @@ impl TileBuilder<'_> {
         }
         self.budget.spend(count * size_of::<Entry>());
         let first = self.out.entries.len();
-        let cones = &self.cones;
-        let entry = |c: &Candidate| Entry { triangle: cones[c.cone as usize].2, nearest: lower(c.near), last: 0 };
+        let numbers = &self.numbers;
+        let entry = |c: &Candidate| Entry { triangle: numbers[c.cone as usize], nearest: lower(c.near), last: 0 };
         self.out.entries.extend(self.scratch[start..].iter().map(entry));
         let list = &mut self.out.entries[first..];
         list.sort_unstable_by_key(|e| (e.nearest, e.triangle));
@@ -397,7 +420,7 @@ impl TileBuilder<'_> {
         let places = (0..PARTS * PARTS).map(|i| (x + f64::from(i % PARTS) * part, y + f64::from(i / PARTS) * part));
         let mut kept = 0;
         for (px, py) in places.clone() {
-            self.choose(&self.window.rect(px, py, part), start, end);
+            self.choose(&self.window.rect(px, py, part), start, end, true);
             kept += self.scratch.len() - end;
             self.scratch.truncate(end);
         }
@@ -408,7 +431,7 @@ impl TileBuilder<'_> {
         let first = self.out.parts.len();
         self.out.parts.resize(first + COUNT, Texel::EMPTY);
         for (i, (px, py)) in places.enumerate() {
-            let covered = self.choose(&self.window.rect(px, py, part), start, end);
+            let covered = self.choose(&self.window.rect(px, py, part), start, end, true);
             let texel = self.texel(px, py, part, divisions + 1, end, covered);
             self.out.parts[first + i] = texel;
             self.scratch.truncate(end);

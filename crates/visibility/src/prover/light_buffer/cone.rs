@@ -10,7 +10,7 @@
 //! let κ = |B−A||C−A|/det. The numerator errs by 8u|B−A||C−A|, the determinant by 16u|B−A||C−A||A|, so that n, at most κ, errs by less than
 //! 16uκ(1 + κ|A|)·2. [`Cone::edge_errors`] and [`Cone::plane_error`] are eight times these bounds or more, in units of a component.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use vdf_geometry::Triangle;
 
 use super::frame::{Face, Rect, SLACK};
@@ -28,6 +28,8 @@ pub(super) struct Cone {
     pub(super) vertices: [DVec3; 3],
     /// The same vertices in the world, for comparisons.
     pub(super) corners: [Vec3; 3],
+    /// On a face: u and v of the vertices; no numbers for those that are not in front of it, or in the axes of the world.
+    flat: [DVec2; 3],
     /// For each edge, from vertex to vertex, the normal of its plane through the light, inwards, with a largest component of 1; zero if
     /// rounding leaves nothing of it.
     pub(super) edges: [DVec3; 3],
@@ -77,13 +79,15 @@ impl Cone {
                 (edges[i], edge_errors[i]) = (cross / largest, error);
             }
         }
-        Some(Self { vertices, corners, edges, edge_errors, plane, plane_error })
+        Some(Self { vertices, corners, flat: [DVec2::NAN; 3], edges, edge_errors, plane, plane_error })
     }
 
     /// The same in the axes of a face.
     pub(super) fn on(&self, face: Face) -> Self {
+        let vertices = self.vertices.map(|v| face.local(v));
         Self {
-            vertices: self.vertices.map(|v| face.local(v)),
+            vertices,
+            flat: vertices.map(|v| if v.z > 0.0 { v.truncate() * v.z.recip() } else { DVec2::NAN }),
             edges: self.edges.map(|e| face.local(e)),
             plane: face.local(self.plane),
             ..*self
@@ -102,16 +106,14 @@ impl Cone {
     /// The part of this face that may see the triangle: least and greatest u, least and greatest v; `None` if none does. For a cone in the
     /// axes of the face.
     pub(super) fn bounds(&self) -> Option<[f64; 4]> {
-        let [a, b, c] = self.vertices;
-        if a.z <= 0.0 && b.z <= 0.0 && c.z <= 0.0 {
+        if self.flat.iter().all(|v| v.is_nan()) {
             return None;
         }
         let whole = Rect { u: 0.0, v: 0.0, half_u: 1.0 + SLACK, half_v: 1.0 + SLACK };
-        if a.z > 0.0 && b.z > 0.0 && c.z > 0.0 {
-            let (us, vs) = ([a.x / a.z, b.x / b.z, c.x / c.z], [a.y / a.z, b.y / b.z, c.y / c.z]);
-            let least = |x: [f64; 3]| x[0].min(x[1]).min(x[2]);
-            let most = |x: [f64; 3]| x[0].max(x[1]).max(x[2]);
-            let bounds = [least(us), most(us), least(vs), most(vs)];
+        if self.is_in_front() {
+            let [a, b, c] = self.flat;
+            let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+            let bounds = [least.x, most.x, least.y, most.y];
             let outside = bounds[0] > whole.half_u || bounds[1] < -whole.half_u;
             if outside || bounds[2] > whole.half_v || bounds[3] < -whole.half_v {
                 return None;
@@ -120,6 +122,12 @@ impl Cone {
             return Some([bounds[0].max(-1.0), bounds[1].min(1.0), bounds[2].max(-1.0), bounds[3].min(1.0)]);
         }
         (self.is_on_the_side(&whole) && self.meets(&whole)).then_some([-1.0, 1.0, -1.0, 1.0])
+    }
+
+    /// Whether all vertices are in front of the face.
+    #[inline]
+    fn is_in_front(&self) -> bool {
+        !self.flat.iter().any(|v| v.is_nan())
     }
 
     /// False only if a side of the rectangle separates it from the triangle, wherever the vertices are.
@@ -140,7 +148,7 @@ impl Cone {
     /// False only if an edge separates triangle and rectangle, or a side of the rectangle does so with vertices on both sides of the light.
     #[inline]
     pub(super) fn may_meet(&self, rect: &Rect) -> bool {
-        self.meets(rect) && (self.vertices.iter().all(|v| v.z > 0.0) || self.is_on_the_side(rect))
+        self.meets(rect) && (self.is_in_front() || self.is_on_the_side(rect))
     }
 
     /// False only if an edge separates triangle and rectangle.
@@ -174,12 +182,11 @@ impl Cone {
         if at.abs() > reach + self.edge_errors[i] {
             return false;
         }
-        let (a, b) = (self.vertices[i], self.vertices[(i + 1) % 3]);
-        if a.z <= 0.0 || b.z <= 0.0 {
-            return true;
-        }
-        let aside = |a: f64, b: f64, middle: f64, half: f64| a.min(b) > middle + half || a.max(b) < middle - half;
-        !(aside(a.x / a.z, b.x / b.z, rect.u, rect.half_u) || aside(a.y / a.z, b.y / b.z, rect.v, rect.half_v))
+        let (a, b) = (self.flat[i], self.flat[(i + 1) % 3]);
+        // All comparisons are false for what is not in front.
+        let beyond = |low: f64, high: f64| (a.x > high && b.x > high) || (a.x < low && b.x < low);
+        let above = |low: f64, high: f64| (a.y > high && b.y > high) || (a.y < low && b.y < low);
+        !(beyond(rect.u - rect.half_u, rect.u + rect.half_u) || above(rect.v - rect.half_v, rect.v + rect.half_v))
     }
 
     /// True only if the direction (u, v, 1) is inside the cone.

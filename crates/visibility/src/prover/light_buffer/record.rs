@@ -18,8 +18,8 @@ pub(super) enum Verdict {
 /// A triangle as a light sees it: the planes of its edges in single precision, its own in double.
 ///
 /// *Rounding.* With u = 2⁻²⁴ and the point relative to the light divided by its largest component, products of an edge's normal (components
-/// of at most 1, rounded by u and known as well as u before) and the point (rounded by u) err by less than 3·3u, and their sum by 9u more:
-/// less than [`EDGE_ERROR`] = 64u. Superficial queries start 2⁻³² of their coordinates off their own surface; so the plane is in double
+/// of at most 1, rounded by u and known as well as u before) and the point (rounded by u) err by 4u each with their own rounding, and their
+/// sum by 5u more: by less than [`EDGE_ERROR`] = 24u. Superficial queries start 2⁻³² of their coordinates off their own surface; so the plane is in double
 /// precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
@@ -31,7 +31,7 @@ pub(super) struct Record {
 }
 
 /// See [`Record`].
-const EDGE_ERROR: f32 = 64.0 / 16_777_216.0;
+const EDGE_ERROR: f32 = 24.0 / 16_777_216.0;
 
 /// The error of the last difference, from one.
 const ONE_ERROR: f64 = 4.0 * f64::EPSILON;
