@@ -282,7 +282,7 @@ impl TileBuilder<'_> {
             if let Some(cone) = Cone::new(&triangles[number as usize], light).map(|c| c.on(face))
                 && let Some(bounds) = cone.bounds()
             {
-                self.cones.push(cone);
+                self.cones.push(cone.with_keys());
                 self.bounds.push(bounds);
                 self.numbers.push(number);
             }
@@ -302,7 +302,7 @@ impl TileBuilder<'_> {
         let end = self.scratch.len();
         for (x, y) in [(x, y), (x + half, y), (x, y + half), (x + half, y + half)] {
             let rect = self.window.rect(f64::from(x), f64::from(y), f64::from(half));
-            let covered = self.choose(&rect, start, end, half == 1);
+            let covered = self.choose(&rect, start, end);
             if self.scratch.len() > end {
                 if self.scratch.len() == end + 1 && covered < f64::INFINITY {
                     self.fill(x, y, half, self.scratch[end].cone);
@@ -330,7 +330,7 @@ impl TileBuilder<'_> {
 
     /// Puts those of the candidates in `start..end` that may decide something in the rectangle behind them, and says beyond which depth it
     /// is covered.
-    fn choose(&mut self, rect: &Rect, start: usize, end: usize, single_texel: bool) -> f64 {
+    fn choose(&mut self, rect: &Rect, start: usize, end: usize) -> f64 {
         let mut covered = f64::INFINITY;
         let (u0, u1) = (rect.u - rect.half_u, rect.u + rect.half_u);
         let (v0, v1) = (rect.v - rect.half_v, rect.v + rect.half_v);
@@ -355,8 +355,7 @@ impl TileBuilder<'_> {
         }
         self.drop_behind(end, covered);
         let members = self.scratch.len() - end;
-        // Where one triangle covers all, a sheet in front of it is left to the texels.
-        if (2..=sheets::MOST).contains(&members) && (covered == f64::INFINITY || single_texel) {
+        if (2..=sheets::MOST).contains(&members) {
             let cones = &self.cones;
             let sheet = self.scratch[end..].iter().map(|c| (&cones[c.cone as usize], c.far));
             let beyond = sheets::covered_beyond(sheet, rect);
@@ -420,7 +419,7 @@ impl TileBuilder<'_> {
         let places = (0..PARTS * PARTS).map(|i| (x + f64::from(i % PARTS) * part, y + f64::from(i / PARTS) * part));
         let mut kept = 0;
         for (px, py) in places.clone() {
-            self.choose(&self.window.rect(px, py, part), start, end, true);
+            self.choose(&self.window.rect(px, py, part), start, end);
             kept += self.scratch.len() - end;
             self.scratch.truncate(end);
         }
@@ -431,7 +430,7 @@ impl TileBuilder<'_> {
         let first = self.out.parts.len();
         self.out.parts.resize(first + COUNT, Texel::EMPTY);
         for (i, (px, py)) in places.enumerate() {
-            let covered = self.choose(&self.window.rect(px, py, part), start, end, true);
+            let covered = self.choose(&self.window.rect(px, py, part), start, end);
             let texel = self.texel(px, py, part, divisions + 1, end, covered);
             self.out.parts[first + i] = texel;
             self.scratch.truncate(end);

@@ -35,6 +35,8 @@ pub(super) struct Cone {
     pub(super) edges: [DVec3; 3],
     /// The largest error of a product of an edge's normal and (u, v, 1), which is at most 3.
     pub(super) edge_errors: [f64; 3],
+    /// For each edge a number that is the same for the same edge of another triangle, in either direction.
+    pub(super) keys: [u64; 3],
     /// The normal n of the plane; zero if rounding leaves nothing of it.
     pub(super) plane: DVec3,
     /// The largest error of a component of `plane`, and of one more rounding; infinite if `plane` is zero.
@@ -79,7 +81,7 @@ impl Cone {
                 (edges[i], edge_errors[i]) = (cross / largest, error);
             }
         }
-        Some(Self { vertices, corners, flat: [DVec2::NAN; 3], edges, edge_errors, plane, plane_error })
+        Some(Self { vertices, corners, flat: [DVec2::NAN; 3], edges, edge_errors, keys: [0; 3], plane, plane_error })
     }
 
     /// The same in the axes of a face.
@@ -92,6 +94,19 @@ impl Cone {
             plane: face.local(self.plane),
             ..*self
         }
+    }
+
+    /// The same with its keys, which only sheets need.
+    pub(super) fn with_keys(self) -> Self {
+        let hash = |v: Vec3| {
+            // Adding zero makes −0 to 0.
+            (v + 0.0)
+                .to_array()
+                .iter()
+                .fold(0_u64, |h, x| (h.rotate_left(21) ^ u64::from(x.to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+        };
+        let [a, b, c] = self.corners.map(hash);
+        Self { keys: [a.wrapping_add(b), b.wrapping_add(c), c.wrapping_add(a)], ..self }
     }
 
     /// A lower bound of the distance of light and triangle: that of the plane, or of the box.
@@ -189,7 +204,14 @@ impl Cone {
         !(beyond(rect.u - rect.half_u, rect.u + rect.half_u) || above(rect.v - rect.half_v, rect.v + rect.half_v))
     }
 
+    /// False only if the direction (u, v, 1) is outside the cone.
+    #[inline]
+    pub(super) fn may_hold(&self, u: f64, v: f64) -> bool {
+        self.meets(&Rect { u, v, half_u: 0.0, half_v: 0.0 })
+    }
+
     /// True only if the direction (u, v, 1) is inside the cone.
+    #[inline]
     pub(super) fn holds(&self, u: f64, v: f64) -> bool {
         self.covers(&Rect { u, v, half_u: 0.0, half_v: 0.0 })
     }

@@ -21,40 +21,36 @@ pub(super) const MOST: usize = 24;
 
 /// An edge of a triangle that may meet the rectangle.
 #[derive(Clone, Copy)]
-struct Edge {
-    /// The same for both directions.
+struct Edge<'a> {
     key: u64,
-    from: Vec3,
-    to: Vec3,
+    cone: &'a Cone,
+    /// Which of the triangle's edges.
+    number: usize,
     /// Place of the triangle.
     member: usize,
 }
 
-impl Edge {
-    fn new(cone: &Cone, i: usize, member: usize) -> Self {
-        // Adding zero makes −0 to 0.
-        let (from, to) = (cone.corners[i] + 0.0, cone.corners[(i + 1) % 3] + 0.0);
-        let hash = |v: Vec3| {
-            v.to_array()
-                .iter()
-                .fold(0_u64, |h, x| (h.rotate_left(21) ^ u64::from(x.to_bits())).wrapping_mul(0x9e37_79b9_7f4a_7c15))
-        };
-        Self { key: hash(from).wrapping_add(hash(to)), from, to, member }
+impl Edge<'_> {
+    fn ends(&self) -> [Vec3; 2] {
+        [self.cone.corners[self.number], self.cone.corners[(self.number + 1) % 3]]
     }
 
-    /// 1 for the same edge, −1 for the same backwards, 0 for another.
+    /// 1 for the same edge, −1 for the same backwards, 0 for another. (Zeros of either sign are equal.)
     fn direction(&self, other: &Self) -> i32 {
-        if self.from == other.from && self.to == other.to {
-            1
-        } else {
-            -i32::from(self.from == other.to && self.to == other.from)
-        }
+        let ([from, to], [other_from, other_to]) = (self.ends(), other.ends());
+        if from == other_from && to == other_to { 1 } else { -i32::from(from == other_to && to == other_from) }
     }
 }
 
 /// The depth beyond which a sheet of these triangles certainly lies in front, in every direction of the rectangle: infinite if there is
 /// none. `members` yields the cones with upper bounds of their depths in the rectangle.
-pub(super) fn covered_beyond<'a>(members: impl Iterator<Item = (&'a Cone, f64)>, rect: &Rect) -> f64 {
+pub(super) fn covered_beyond<'a>(members: impl Iterator<Item = (&'a Cone, f64)> + Clone, rect: &Rect) -> f64 {
+    // Nearly always a corner shows that there is none.
+    let signs = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+    let corners = signs.map(|(u, v)| (rect.u + u * rect.half_u, rect.v + v * rect.half_v));
+    if corners.iter().any(|&(u, v)| !members.clone().any(|(cone, _)| cone.may_hold(u, v))) {
+        return f64::INFINITY;
+    }
     let mut edges: SmallVec<[Edge; 96]> = SmallVec::new();
     // Of each component, at its root: is it open, does it cover a point, how far is it.
     let mut parent: SmallVec<[usize; MOST]> = SmallVec::new();
@@ -63,7 +59,8 @@ pub(super) fn covered_beyond<'a>(members: impl Iterator<Item = (&'a Cone, f64)>,
     let mut far: SmallVec<[f64; MOST]> = SmallVec::new();
     for (member, (cone, farthest)) in members.enumerate() {
         let before = edges.len();
-        edges.extend((0..3).filter(|&i| cone.edge_meets(i, rect)).map(|i| Edge::new(cone, i, member)));
+        let met = (0..3).filter(|&number| cone.edge_meets(number, rect));
+        edges.extend(met.map(|number| Edge { key: cone.keys[number], cone, number, member }));
         parent.push(member);
         open.push(false);
         // One that has no edge here covers the rectangle or misses it.
@@ -121,7 +118,7 @@ mod tests {
         let cones: Vec<_> = triangles
             .iter()
             .filter_map(|t| Cone::new(&Triangle { vertices: t.map(Vec3::from_array) }, DVec3::ZERO))
-            .map(|cone| cone.on(face))
+            .map(|cone| cone.on(face).with_keys())
             .collect();
         let members = cones.iter().filter_map(|c| c.depths(&RECT).filter(|_| c.may_meet(&RECT)).map(|d| (c, d[1])));
         covered_beyond(members, &RECT)
