@@ -15,6 +15,7 @@
 //! # }
 //! ```
 
+mod clock;
 mod error;
 mod progress;
 pub mod queries;

@@ -12,7 +12,6 @@ pub(crate) use area::{Occluders, Site};
 pub(crate) use field::each_field;
 pub use field::{DistanceField, FieldProver};
 pub use light_buffer::{LightBuffer, LookUp, Refusal};
-use light_buffer::{Place, Texel};
 pub use provers::Provers;
 
 /// What is known of a closed segment.

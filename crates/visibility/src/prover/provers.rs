@@ -4,7 +4,7 @@ use glam::DVec3;
 use vdf_distfield::Neighbourhood;
 use vdf_voxel::{VoxelGrid, VoxelSet};
 
-use super::{Answer, DistanceField, FieldProver, LightBuffer, LightProver, Place, Texel};
+use super::{Answer, DistanceField, FieldProver, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
 
 /// What the neighbourhood of a point light at `to`, in the grid, says of a segment. One that comes from outside is clipped to the grid: along
@@ -84,25 +84,27 @@ impl Provers {
     }
 
     fn answer_batch(&self, queries: &[ShadowQuery], answers: &mut [Answer]) {
-        let mut places: [Option<(&LightBuffer, Place)>; BATCH] = [None; BATCH];
+        // First where all of them have to look; loads that depend on nothing then overlap.
+        let mut places = [None; BATCH];
         for ((query, answer), place) in queries.iter().zip(answers.iter_mut()).zip(&mut places) {
             match self.lights.get(query.emitter) {
-                Some(LightProver::Buffer(buffer)) if query.to == buffer.position() => match buffer.place(query.from) {
-                    Ok(found) => *place = Some((buffer, found)),
-                    Err(known) => *answer = known,
-                },
+                Some(LightProver::Buffer(buffer)) if query.to == buffer.position() => {
+                    match buffer.texel_of(query.from) {
+                        Ok((texel, code)) => *place = Some((buffer, texel, code)),
+                        Err(known) => *answer = known,
+                    }
+                }
                 _ => *answer = self.answer(query),
             }
         }
-        let mut texels = [Texel::EMPTY; BATCH];
-        for (texel, place) in texels.iter_mut().zip(&places) {
-            if let Some((buffer, place)) = place {
-                *texel = buffer.texel(place);
+        for (answer, place) in answers.iter_mut().zip(&places) {
+            if let Some((buffer, texel, code)) = place {
+                *answer = buffer.compare(*texel, *code);
             }
         }
-        for ((answer, place), texel) in answers.iter_mut().zip(&places).zip(texels) {
-            if let Some((buffer, place)) = place {
-                *answer = buffer.decide(place, texel).answer;
+        for ((query, answer), place) in queries.iter().zip(answers).zip(&places) {
+            if let (Answer::Unknown, Some((buffer, ..))) = (*answer, place) {
+                *answer = buffer.answer(query.from);
             }
         }
     }

@@ -5,6 +5,8 @@ use std::{hint::black_box, time::Instant};
 use rayon::prelude::*;
 use vdf_visibility::{Answer, Counters, Provers, QueryKind, ShadowQuery, Visibility};
 
+use crate::clock::ThreadTime;
+
 /// How many queries were proved when every answer was compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Checked(Counters);
@@ -40,31 +42,31 @@ pub(crate) fn check(visibility: &Visibility<'_>, queries: &[ShadowQuery], truth:
 
 /// One pass over queries that asks only for proofs: its seconds, and how many there are.
 pub(super) fn proof_pass(provers: &Provers, queries: &[ShadowQuery]) -> (f64, usize) {
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let mut proved = 0;
     for q in queries {
         proved += usize::from(provers.answer(black_box(q)) != Answer::Unknown);
     }
-    (start.elapsed().as_secs_f64(), proved)
+    (start.seconds(), proved)
 }
 
 /// One pass over queries as a render asks them: its seconds, and how many are unoccluded.
 pub(super) fn query_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery]) -> (f64, usize) {
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let mut counters = Counters::default();
     let mut unoccluded = 0;
     for q in queries {
         unoccluded += usize::from(visibility.unoccluded(black_box(q), &mut counters));
     }
     black_box(counters);
-    (start.elapsed().as_secs_f64(), unoccluded)
+    (start.seconds(), unoccluded)
 }
 
 /// One pass over queries as a render asks them that has many at once, `batch` at a time: its seconds, and how many are
 /// unoccluded.
 pub(super) fn batch_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery], batch: usize) -> (f64, usize) {
     let mut answers = vec![false; batch];
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let mut counters = Counters::default();
     let mut unoccluded = 0;
     for queries in queries.chunks(batch) {
@@ -73,12 +75,12 @@ pub(super) fn batch_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery], b
         unoccluded += answers.iter().filter(|&&a| a).count();
     }
     black_box(counters);
-    (start.elapsed().as_secs_f64(), unoccluded)
+    (start.seconds(), unoccluded)
 }
 
 /// A pass of the hierarchy with a timer around each query: as [`query_pass`], and the sum of what the timers say.
 pub(super) fn timer_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery]) -> ((f64, usize), f64) {
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let mut counters = Counters::default();
     let (mut unoccluded, mut said) = (0, 0.0);
     for q in queries {
@@ -87,17 +89,17 @@ pub(super) fn timer_pass(visibility: &Visibility<'_>, queries: &[ShadowQuery]) -
         said += start.elapsed().as_secs_f64();
     }
     black_box(counters);
-    ((start.elapsed().as_secs_f64(), unoccluded), said)
+    ((start.seconds(), unoccluded), said)
 }
 
 /// Nanoseconds a query to read the stream and nothing else.
 pub(super) fn empty_pass(queries: &[ShadowQuery]) -> f64 {
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let mut sum = glam::DVec3::ZERO;
     for q in queries {
         let q = black_box(q);
         sum += q.from + q.to;
     }
     black_box(sum);
-    1e9 * start.elapsed().as_secs_f64() / queries.len() as f64
+    1e9 * start.seconds() / queries.len() as f64
 }

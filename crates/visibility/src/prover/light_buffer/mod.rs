@@ -81,7 +81,7 @@ pub struct LookUp {
 
 /// What is known of a pyramid of directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Texel {
+struct Texel {
     /// A query with a lower code meets nothing.
     lit: u16,
     /// A query with this code or a higher one is occluded.
@@ -90,7 +90,7 @@ pub(super) struct Texel {
 }
 
 impl Texel {
-    pub(super) const EMPTY: Self = Self { lit: NEVER, occluded: NEVER, tag: Tag(0) };
+    const EMPTY: Self = Self { lit: NEVER, occluded: NEVER, tag: Tag(0) };
 }
 
 /// What decides the other queries: two bits of kind and a number.
@@ -155,10 +155,11 @@ struct Entry {
 
 /// A query's place: what comparisons and tests need of it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+struct Place {
     d: DVec3,
     w: f64,
     inverse_w: f64,
+    /// Where in the texel, from 0 to 1.
     x: f64,
     y: f64,
     texel: usize,
@@ -201,35 +202,43 @@ impl LightBuffer {
     #[must_use]
     pub fn look_up(&self, from: DVec3) -> LookUp {
         match self.place(from) {
-            Ok(place) => self.decide(&place, self.texel(&place)),
+            Ok(place) => self.decide(&place, self.texels[place.texel]),
             Err(answer) => LookUp { answer, tests: 0 },
         }
     }
 
-    /// The texel of a place. Nothing else of a look-up waits for memory where comparisons decide.
+    /// What has to be loaded for a query, and its depth; or its answer if it needs none of it.
     #[inline]
-    pub(super) fn texel(&self, place: &Place) -> Texel {
-        self.texels[place.texel]
+    pub(super) fn texel_of(&self, from: DVec3) -> Result<(usize, u16), Answer> {
+        self.place(from).map(|place| (place.texel, place.code))
+    }
+
+    /// The answer at a texel for a query of this depth, if comparisons decide.
+    #[inline]
+    pub(super) fn compare(&self, texel: usize, code: u16) -> Answer {
+        let texel = self.texels[texel];
+        if code < texel.lit {
+            Answer::Unoccluded
+        } else if code >= texel.occluded {
+            Answer::Occluded
+        } else {
+            Answer::Unknown
+        }
     }
 
     /// The place of a query, or its answer if it has none.
-    #[inline]
-    pub(super) fn place(&self, from: DVec3) -> Result<Place, Answer> {
+    #[inline(always)]
+    fn place(&self, from: DVec3) -> Result<Place, Answer> {
         let d = from - self.position;
         let face = Face::of(d);
-        let local = face.local(d);
-        let w = local.z;
+        let [u, v, w] = face.magnitudes(d);
         // The light itself, and what is no number.
         if !(w > 0.0 && w < f64::MAX) {
             return Err(Answer::Unknown);
         }
         let window = &self.windows[face.index()];
         let inverse_w = w.recip();
-        let Some((x, y)) = window.place(local.x * inverse_w, local.y * inverse_w) else {
-            return Err(Answer::Unoccluded);
-        };
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in the window")]
-        let (i, j) = (x as u32, y as u32);
+        let Some(([i, j], [x, y])) = window.place(u * inverse_w, v * inverse_w) else { return Err(Answer::Unoccluded) };
         let tile = (j / TILE) * (window.side() / TILE) + i / TILE;
         let texel = window.first as usize + tile as usize * TILE_TEXELS + Self::place_in_tile(i, j);
         Ok(Place { d, w, inverse_w, x, y, texel, code: self.depths.of(w) })
@@ -243,7 +252,7 @@ impl LightBuffer {
 
     /// The answer at a place.
     #[inline]
-    pub(super) fn decide(&self, place: &Place, texel: Texel) -> LookUp {
+    fn decide(&self, place: &Place, texel: Texel) -> LookUp {
         if place.code < texel.lit {
             LookUp { answer: Answer::Unoccluded, tests: 0 }
         } else if place.code >= texel.occluded {
@@ -294,9 +303,13 @@ impl LightBuffer {
     /// The answer in the part of a divided texel, whose parts start at `first`.
     #[cold]
     fn decide_part(&self, place: &Place, first: usize) -> LookUp {
-        let (x, y) = (place.x.fract() * f64::from(PARTS), place.y.fract() * f64::from(PARTS));
+        let parts = f64::from(PARTS);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the number of parts")]
-        let (i, j) = (x as usize, y as usize);
+        let part = |at: f64| {
+            let part = ((at * parts) as u32).min(PARTS - 1);
+            (part as usize, at * parts - f64::from(part))
+        };
+        let ((i, x), (j, y)) = (part(place.x), part(place.y));
         self.decide(&Place { x, y, ..*place }, self.texels[first + j * PARTS as usize + i])
     }
 }
