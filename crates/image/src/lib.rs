@@ -32,7 +32,8 @@ mod srgb;
 
 pub use error::ImageError;
 pub use exr::{
-    AttributeValue, ComponentFormat, ExrOptions, read_exr, stage_exr, stage_exr_with, write_exr, write_exr_with,
+    AttributeValue, ComponentFormat, ExrOptions, decode_exr, read_exr, stage_exr, stage_exr_with, write_exr,
+    write_exr_with,
 };
 pub use files::{
     Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, write_atomically,
