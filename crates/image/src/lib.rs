@@ -36,7 +36,8 @@ pub use exr::{
     write_exr_with,
 };
 pub use files::{
-    Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, write_atomically,
+    Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, shown,
+    write_atomically,
 };
 pub use format::{ImageFormat, read_image};
 pub use image::Image;
