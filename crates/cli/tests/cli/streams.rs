@@ -164,7 +164,7 @@ fn files_beyond_the_limit_of_their_size() {
     sandbox.render(&["-o", "a.exr", "-D", "width=16"]);
     limited("scene write cbox_vol6 s").succeeded();
     limited("scene write scape t").failed(1, &["File too large"]);
-    limited("voxelize --voxel 8 --export v").failed(1, &["cannot write v/occupied.obj: File too large"]);
+    limited("voxelize --method amr --voxel 8 --export v").failed(1, &["cannot write v/occupied.obj: File too large"]);
     assert_eq!(fs::read_dir(sandbox.path().join("v")).unwrap().count(), 0);
 }
 
