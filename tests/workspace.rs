@@ -76,19 +76,21 @@ fn no_arrow_is_added() {
     }
 }
 
+/// The files of Rust below a folder.
+fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
 /// What a crate includes must be in its own folder, or it cannot be packaged.
 #[test]
 fn crates_include_only_files_of_their_own() {
-    fn sources(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
-        for entry in std::fs::read_dir(folder).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                sources(&path, found);
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                found.push(path);
-            }
-        }
-    }
     let mut folders: Vec<_> =
         std::fs::read_dir(root().join("crates")).expect("crates").map(|e| e.expect("an entry").path()).collect();
     folders.push(root().join("scenes"));
@@ -110,4 +112,22 @@ fn the_readme_has_the_table_of_methods() {
     let readme = std::fs::read_to_string(root().join("README.md")).expect("the README");
     let table = vdf::visibility::method_table();
     assert!(readme.contains(&table), "put this into README.md:\n{table}");
+}
+
+/// A table of which test covers what is worth nothing once a test has another name.
+#[test]
+fn the_reports_of_users_name_tests_that_exist() {
+    let mut files = Vec::new();
+    sources(&root().join("crates"), &mut files);
+    sources(&root().join("tests"), &mut files);
+    let code: Vec<String> = files.iter().map(|f| std::fs::read_to_string(f).expect("UTF-8")).collect();
+    let table = std::fs::read_to_string(root().join("docs/reports-of-users.md")).expect("the table");
+    let cells =
+        table.lines().filter(|l| l.starts_with("| ")).filter_map(|l| l.trim_end_matches(" |").rsplit("| ").next());
+    let names: Vec<&str> = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
+    assert!(names.len() > 60, "{}", names.len());
+    for name in names {
+        let test = format!("fn {name}()");
+        assert!(code.iter().any(|text| text.contains(&test)), "there is no test {name}");
+    }
 }

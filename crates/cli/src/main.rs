@@ -18,6 +18,7 @@ use crate::{
 };
 
 fn main() -> ExitCode {
+    survive_limits();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         // Help and version go to stdout, usage errors to stderr; clap knows which, but not whether they arrived.
@@ -29,6 +30,16 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
+    }
+}
+
+/// Beyond the limit of a file's size a write shall fail, as on a full disk, so that what was begun is cleaned up. By default the signal that
+/// comes with it ends the program on the spot.
+fn survive_limits() {
+    #[cfg(unix)]
+    {
+        // If that cannot be had, the program still works, and ends as it did.
+        drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default()));
     }
 }
 

@@ -2,12 +2,14 @@
 
 use std::{io, path::PathBuf};
 
+use crate::files::shown;
+
 /// Why an image could not be read, written or compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
     /// The system refused to write.
-    #[error("cannot write {}", path.display())]
+    #[error("cannot write {}", shown(path))]
     Write {
         /// The file.
         path: PathBuf,
@@ -15,7 +17,7 @@ pub enum ImageError {
         source: io::Error,
     },
     /// The system refused to read.
-    #[error("cannot read {}", path.display())]
+    #[error("cannot read {}", shown(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -23,7 +25,7 @@ pub enum ImageError {
         source: io::Error,
     },
     /// The file can be read but is not an image that we understand.
-    #[error("cannot read {}: {reason}", path.display())]
+    #[error("cannot read {}: {reason}", shown(path))]
     Format {
         /// The file.
         path: PathBuf,
@@ -34,7 +36,7 @@ pub enum ImageError {
     #[error(
         "cannot read {}: its {width} x {height} pixels need {bytes} bytes of memory, and at most {limit} are taken; \
          scale it down or crop it",
-        path.display()
+        shown(path)
     )]
     TooLarge {
         /// The file.
@@ -62,7 +64,7 @@ pub enum ImageError {
         bytes: u64,
     },
     /// The image or its attributes cannot be stored.
-    #[error("cannot write {}: {reason}", path.display())]
+    #[error("cannot write {}: {reason}", shown(path))]
     Unencodable {
         /// The file.
         path: PathBuf,

@@ -241,6 +241,15 @@ fn seeds() -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
     (exrs.collect(), pngs)
 }
 
+/// What the fuzzer starts from and what it has found; nothing in a packaged crate.
+fn corpus() -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/exr");
+    let mut paths: Vec<_> =
+        std::fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths.iter().map(|path| std::fs::read(path).unwrap()).collect()
+}
+
 /// Panics of the decoder are caught where they are expected; nobody should have to read them in the log of a test.
 fn silence_the_decoder() {
     let tell = std::panic::take_hook();
@@ -255,7 +264,8 @@ fn silence_the_decoder() {
 /// Reads `count` mutations; returns how many were images still.
 fn run(count: u64, first: u64) -> u64 {
     silence_the_decoder();
-    let (exrs, pngs) = seeds();
+    let (mut exrs, pngs) = seeds();
+    exrs.extend(corpus());
     let mut images = 0;
     for case in first..first + count {
         let mut random = Random(case);

@@ -32,10 +32,12 @@ mod srgb;
 
 pub use error::ImageError;
 pub use exr::{
-    AttributeValue, ComponentFormat, ExrOptions, read_exr, stage_exr, stage_exr_with, write_exr, write_exr_with,
+    AttributeValue, ComponentFormat, ExrOptions, decode_exr, read_exr, stage_exr, stage_exr_with, write_exr,
+    write_exr_with,
 };
 pub use files::{
-    Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, write_atomically,
+    Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, shown,
+    write_atomically,
 };
 pub use format::{ImageFormat, read_image};
 pub use image::Image;

@@ -2,6 +2,7 @@
 
 use std::{io, path::PathBuf};
 
+use vdf_image::shown;
 use vdf_render::RenderError;
 
 /// Why something could not be measured or checked.
@@ -27,7 +28,7 @@ pub enum LabError {
     #[error(transparent)]
     Image(#[from] vdf_image::ImageError),
     /// A file of visibility queries cannot be read, or is none, or was recorded in another scene.
-    #[error("{}: {message}", path.display())]
+    #[error("{}: {message}", shown(path))]
     Queries {
         /// The file.
         path: PathBuf,
@@ -43,7 +44,7 @@ pub enum LabError {
         help: &'static str,
     },
     /// A file or folder could not be written.
-    #[error("cannot write {}", path.display())]
+    #[error("cannot write {}", shown(path))]
     Write {
         /// The file or folder.
         path: PathBuf,
@@ -51,7 +52,7 @@ pub enum LabError {
         source: io::Error,
     },
     /// There is no place for the references of a convergence report.
-    #[error("cannot keep references in {}; choose another folder as the cache", folder.display())]
+    #[error("cannot keep references in {}; choose another folder as the cache", shown(folder))]
     References {
         /// The folder.
         folder: PathBuf,

@@ -89,6 +89,13 @@ impl PreparedScene {
             None => build_by_default(method, default_voxel_size(&bounds), build, &mut notes),
         };
         let (method, (provers, build)) = built?;
+        let over_budget = build.over_budget();
+        if over_budget > 0 {
+            let all = build.lights.len();
+            notes.push(format!(
+                "{over_budget} of {all} lights have no neighbourhood, which would take too much memory or time in all: their queries take longer"
+            ));
+        }
         drop(lights);
         Ok(Self { scene, world, t_hierarchy, method, provers, build, notes })
     }

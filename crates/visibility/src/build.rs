@@ -96,6 +96,15 @@ impl BuildReport {
         self.parts.iter().map(|p| p.bytes).sum()
     }
 
+    /// Lights that have no neighbourhood of their own because those of the lights before them take all memory or time that there is.
+    #[must_use]
+    pub fn over_budget(&self) -> usize {
+        self.lights
+            .iter()
+            .filter(|light| light.fallback.is_some_and(|why| [TOO_LARGE, TOO_LONG].contains(&why)))
+            .count()
+    }
+
     /// Does a step and writes down what it took.
     fn step<T>(
         &mut self,
@@ -262,6 +271,12 @@ fn shared_bytes(kind: Option<FieldKind>, resolution: Resolution) -> u64 {
     (resolution.voxel_count() as u64).saturating_mul(planes).saturating_add(VoxelSet::bytes_of(resolution))
 }
 
+/// Neighbourhoods are built as long as they visit no more voxels or rows than this; each takes a few nanoseconds. It is enough for 500 lights in a
+/// grid of 128³ voxels with safe neighbourhoods, and for 60,000 with extended ones.
+const MOST_VISITS: u64 = 1 << 30;
+const TOO_LARGE: &str = "its neighbourhood does not fit into the limit of memory";
+const TOO_LONG: &str = "the neighbourhoods of so many lights would take too long";
+
 /// What the hierarchy of an area light's near triangles takes at most, in bytes.
 const NEAR_BYTES: u64 = 32 << 10;
 
@@ -296,13 +311,7 @@ impl LightBuilder<'_> {
         let occluders = Occluders::new(&self.grid, if any_area { triangles } else { &[] }, self.occupied)?;
         let mut wanting: Vec<_> = lights.iter().zip(kept).filter(|(_, kept)| kept.prover.is_none()).collect();
         let mut plans: Vec<_> = wanting.par_iter().map(|(light, _)| self.plan(&occluders, light)).collect();
-        let mut free = free;
-        for plan in &mut plans {
-            match free.checked_sub(self.bytes(plan)) {
-                Some(rest) => free = rest,
-                None => *plan = Plan::Field(Some("its neighbourhood does not fit into the limit of memory")),
-            }
-        }
+        self.cut_to_budget(&mut plans, free);
         let built: Vec<_> = plans.into_par_iter().map(|plan| self.build(&occluders, plan)).collect::<Result<_, _>>()?;
         let mut bytes = 0;
         for ((_, kept), (prover, fallback)) in wanting.iter_mut().zip(built) {
@@ -327,6 +336,28 @@ impl LightBuilder<'_> {
                 Site::Crowded => Plan::Field(Some("too many triangles are near it")),
                 Site::Found { light, near } => Plan::Area(light, near),
             },
+        }
+    }
+
+    /// The first lights have what they want, as long as memory and time allow.
+    fn cut_to_budget(&self, plans: &mut [Plan], mut free: u64) {
+        let mut visits = MOST_VISITS;
+        for plan in plans {
+            match (free.checked_sub(self.bytes(plan)), visits.checked_sub(self.visits(plan))) {
+                (Some(rest), Some(left)) => (free, visits) = (rest, left),
+                (None, _) => *plan = Plan::Field(Some(TOO_LARGE)),
+                (_, None) => *plan = Plan::Field(Some(TOO_LONG)),
+            }
+        }
+    }
+
+    /// The voxels or rows that are visited to build what is planned.
+    fn visits(&self, plan: &Plan) -> u64 {
+        let r = self.grid.resolution();
+        match (plan, self.point) {
+            (Plan::Field(_), _) => 0,
+            (Plan::Point(_), PointProver::Safe) => r.voxel_count() as u64,
+            _ => u64::from(r.y()) * u64::from(r.z()),
         }
     }
 
@@ -438,6 +469,22 @@ mod tests {
                 assert_eq!(light.fallback.is_some(), light.voxels.is_none());
                 assert!(light.fallback.is_none_or(|reason| reason.contains("memory")), "{light:?}");
             }
+            assert_eq!(report.over_budget(), 3_000 - 10);
+        }
+    }
+
+    /// 2³⁰ visits are 1,073 safe neighbourhoods of a million voxels; those of rows take far less.
+    #[test]
+    fn lights_that_would_take_too_long_ask_the_field() {
+        let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(10.0), 0.1, 1 << 20).expect("a million voxels");
+        let occupied = VoxelSet::new(grid.resolution());
+        for (point, expected) in [(PointProver::Safe, 1_073), (PointProver::Extended, 5_000)] {
+            let builder = LightBuilder { point, grid, occupied: &occupied, field: None };
+            let mut plans: Vec<_> = (0..5_000).map(|_| Plan::Point(Voxel { i: 0, j: 0, k: 0 })).collect();
+            builder.cut_to_budget(&mut plans, u64::MAX);
+            let built = plans.iter().filter(|plan| matches!(plan, Plan::Point(_))).count();
+            assert_eq!(built, expected);
+            assert!(plans.iter().skip(built).all(|plan| matches!(plan, Plan::Field(Some(TOO_LONG)))));
         }
     }
 

@@ -62,6 +62,9 @@ pub(crate) struct ReportConvergenceArgs {
     /// Folder of the references; made if it does not exist [default: vdf-references where the system keeps caches]
     #[arg(long, value_name = "DIR")]
     pub(crate) cache: Option<PathBuf>,
+    /// Which sensor of the scene file, counted from 0 [default: the first]
+    #[arg(long, value_name = "N")]
+    pub(crate) sensor: Option<usize>,
     /// Set a parameter of the scene file; may be given several times
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub(crate) defines: Vec<(String, String)>,

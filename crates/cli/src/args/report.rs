@@ -90,6 +90,9 @@ pub(crate) struct ReportQueriesArgs {
     /// Folder to write the triangles and the queries to, for other programs; made if it does not exist
     #[arg(long, value_name = "DIR")]
     pub(crate) export: Option<PathBuf>,
+    /// Which sensor of the scene file, counted from 0 [default: the first]
+    #[arg(long, value_name = "N")]
+    pub(crate) sensor: Option<usize>,
     /// Set a parameter of the scene file; may be given several times
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub(crate) defines: Vec<(String, String)>,

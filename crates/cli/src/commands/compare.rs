@@ -6,8 +6,9 @@ use anyhow::{Context as _, anyhow};
 use vdf_image::{
     Image, ImageError, ImageFormat, check_writable,
     metrics::{Comparison, DynamicRange, compare, write_error_map},
-    read_image,
+    read_image, shown,
 };
+use vdf_render::{RenderError, on_threads};
 
 use crate::{args::CompareArgs, failure::Failure};
 
@@ -16,11 +17,13 @@ pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
         check_map(map, args)?;
     }
     let (a, b, range) = read(args)?;
-    let comparison = compare(&a, &b, range, args.ppd).map_err(|e| match e {
+    // The default pool would panic if it could not start.
+    let comparison = on_threads(None, || Ok::<_, RenderError>(compare(&a, &b, range, args.ppd)))?;
+    let comparison = comparison.map_err(|e| match e {
         // The library knows no names of files.
         ImageError::Uncomparable { image, reason } => {
             let path = if image == "image" { &args.a } else { &args.b };
-            Failure::Usage(anyhow!("cannot compare: {} {reason}", path.display()))
+            Failure::Usage(anyhow!("cannot compare: {} {reason}", shown(path)))
         }
         ImageError::PixelsPerDegree { value } => {
             Failure::Usage(anyhow!("--ppd must be from 1 to 1000 pixels, not {value}"))
@@ -51,9 +54,9 @@ fn check_map(map: &Path, args: &CompareArgs) -> Result<(), Failure> {
     if canonical(map)
         .is_some_and(|map| [&args.a, &args.b].into_iter().any(|image| canonical(image).as_ref() == Some(&map)))
     {
-        return Err(Failure::Usage(anyhow!("--map {}: that is one of the images; give another name", map.display())));
+        return Err(Failure::Usage(anyhow!("--map {}: that is one of the images; give another name", shown(map))));
     }
-    check_writable(map).with_context(|| format!("cannot write {}", map.display())).map_err(Failure::Work)
+    check_writable(map).with_context(|| format!("cannot write {}", shown(map))).map_err(Failure::Work)
 }
 
 fn read(args: &CompareArgs) -> Result<(Image, Image, DynamicRange), Failure> {
@@ -71,8 +74,8 @@ fn read(args: &CompareArgs) -> Result<(Image, Image, DynamicRange), Failure> {
 fn mixed(exr: &Path, png: &Path) -> Failure {
     Failure::Usage(anyhow!(
         "{} is an EXR and {} a PNG, which is rounded and clamped: compare EXR with EXR or PNG with PNG (vdf render writes both)",
-        exr.display(),
-        png.display()
+        shown(exr),
+        shown(png)
     ))
 }
 

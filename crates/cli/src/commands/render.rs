@@ -8,7 +8,8 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use serde::Serialize;
 use vdf_image::{
-    AttributeValue, ComponentFormat, ExrOptions, StagedFile, check_distinct, check_writable, stage_exr_with, stage_png,
+    AttributeValue, ComponentFormat, ExrOptions, StagedFile, check_distinct, check_writable, shown, stage_exr_with,
+    stage_png,
 };
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
@@ -73,10 +74,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let stdout = &mut std::io::stdout();
     if !args.quiet {
         writeln!(stdout, "{}", rendering.statistics)?;
-        writeln!(stdout, "wrote          {} and {}", output.exr.display(), output.png.display())?;
+        writeln!(stdout, "wrote          {} and {}", shown(&output.exr), shown(&output.png))?;
         if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
             let (n, paths) = (stream.queries.len(), stream.origin.paths_recorded);
-            writeln!(stdout, "recorded       {n} queries of {paths} paths in {}", path.display())?;
+            writeln!(stdout, "recorded       {n} queries of {paths} paths in {}", shown(path))?;
         }
     }
     Ok(())
@@ -90,7 +91,7 @@ struct Output {
 
 /// Writes recorded queries.
 pub(super) fn write_stream(path: &Path, stream: &QueryStream) -> Result<(), Failure> {
-    stream.write(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)
+    stream.write(path).with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)
 }
 
 /// The integrator with its samples per segment, if it takes any.
@@ -150,11 +151,11 @@ pub(super) fn load(
     let path = scene.unwrap_or(Path::new(DEFAULT_SCENE));
     if scene.is_none() || !path.exists() || path.is_dir() {
         if let Some(source) = path.to_str().and_then(builtin) {
-            let name = path.display().to_string();
+            let name = shown(path).to_string();
             return Ok(Named { name, scene: Scene::from_source(&source, &options)?, inputs: vec![] });
         }
         let what = if path.is_dir() { "a folder; name the scene file in it" } else { "no such file" };
-        let (path, names) = (path.display(), builtin_names().join(", "));
+        let (path, names) = (shown(path), builtin_names().join(", "));
         return Err(Failure::Usage(anyhow!("{path}: {what}, nor a built-in scene; the built-in scenes are {names}")));
     }
     let name = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
@@ -169,7 +170,7 @@ fn output(args: &RenderArgs, named: &Named) -> Result<Output, Failure> {
     if exr.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
         return Err(Failure::Usage(anyhow!(
             "{}: the output must end in .exr; a .png is written beside it",
-            exr.display()
+            shown(&exr)
         )));
     }
     let png = exr.with_extension("png");
@@ -182,7 +183,7 @@ fn output(args: &RenderArgs, named: &Named) -> Result<Output, Failure> {
     let outputs = outputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
     named.check_outputs(&outputs.clone().collect::<Vec<_>>())?;
     for (_, path) in outputs {
-        check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+        check_writable(path).with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)?;
     }
     Ok(Output { exr, png })
 }
@@ -213,14 +214,14 @@ fn write_all(
 /// Writes the figures of a run for machines.
 pub(super) fn write_json(path: &Path, figures: &impl Serialize) -> Result<(), Failure> {
     let file = stage_json(path, figures)?;
-    file.persist().with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)
+    file.persist().with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)
 }
 
 fn stage_json(path: &Path, figures: &impl Serialize) -> Result<StagedFile, Failure> {
     let json =
         serde_json::to_string_pretty(figures).context("cannot express the figures as JSON").map_err(Failure::Work)?;
     StagedFile::write(path, |w| writeln!(w, "{json}"))
-        .with_context(|| format!("cannot write {}", path.display()))
+        .with_context(|| format!("cannot write {}", shown(path)))
         .map_err(Failure::Work)
 }
 

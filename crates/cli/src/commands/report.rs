@@ -3,7 +3,7 @@
 use std::{env, io::Write as _, path::Path};
 
 use anyhow::Context as _;
-use vdf_image::{StagedFile, check_distinct, check_writable};
+use vdf_image::{StagedFile, check_distinct, check_writable, shown};
 use vdf_lab::{
     LabError,
     queries::{QueryStream, ReplayOptions, record_queries},
@@ -57,7 +57,7 @@ fn run_queries(args: &ReportQueriesArgs) -> Result<(), Failure> {
     let others = exported.iter().flatten().map(|path| ("--export", path.as_path()));
     args.files.check(&others.chain(args.queries.as_deref().map(|path| ("--queries", path))).collect::<Vec<_>>())?;
     let stream = args.queries.as_deref().map(QueryStream::read).transpose()?;
-    let named = load(args.scene.as_deref(), &args.defines, None)?;
+    let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
     recorded.validate(&named.scene)?;
     named.check_outputs(&args.files.outputs())?;
     named.warn();
@@ -93,7 +93,7 @@ fn run_convergence(args: &ReportConvergenceArgs) -> Result<(), Failure> {
         ..standard
     };
     options.validate()?;
-    let named = load(args.scene.as_deref(), &args.defines, None)?;
+    let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
     args.files.check(&[])?;
     named.check_outputs(&args.files.outputs())?;
     named.warn();
@@ -171,7 +171,7 @@ impl ReportFiles {
         let all: Vec<_> = others.iter().copied().chain(self.named()).collect();
         check_distinct(&all, &[]).map_err(|conflict| Failure::Usage(conflict.into()))?;
         for (_, path) in self.named() {
-            check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+            check_writable(path).with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)?;
         }
         Ok(())
     }
@@ -196,14 +196,14 @@ impl ReportFiles {
                 _ => report.json(),
             }?;
             let file = StagedFile::write(path, |out| out.write_all(content.as_bytes()));
-            let file = file.with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+            let file = file.with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)?;
             staged.push(file);
         }
         StagedFile::persist_all(staged).map_err(|error| Failure::Work(error.into()))?;
         let stdout = &mut std::io::stdout().lock();
         write!(stdout, "{}", report.text())?;
         for (_, path) in self.named() {
-            writeln!(stdout, "wrote {}", path.display())?;
+            writeln!(stdout, "wrote {}", shown(path))?;
         }
         Ok(())
     }

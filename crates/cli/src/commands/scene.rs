@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context as _, anyhow};
-use vdf_image::write_atomically;
+use vdf_image::{shown, write_atomically};
 use vdf_scene::EmbeddedFile;
 use vdf_scenes::{GeneratedFile, builtin, builtin_names, generated};
 
@@ -76,13 +76,13 @@ fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Resul
         let path = folder.join(file.path());
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent)
-            .with_context(|| format!("cannot make the folder {}", parent.display()))
+            .with_context(|| format!("cannot make the folder {}", shown(parent)))
             .map_err(Failure::Work)?;
         let result = write_atomically(&path, |out| file.write(&mut Interruptible { out, reporter: &reporter }));
         if result.is_err() && reporter.interrupted() {
             return Err(Failure::InterruptedAfter { written });
         }
-        result.with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+        result.with_context(|| format!("cannot write {}", shown(&path))).map_err(Failure::Work)?;
         writeln!(io::stdout(), "{}", path.display())?;
     }
     Ok(())

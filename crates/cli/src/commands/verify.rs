@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use anyhow::{Context as _, anyhow};
-use vdf_image::check_writable;
+use vdf_image::{check_writable, shown};
 use vdf_lab::verify::{VerifyOptions, VerifyReport, verify};
 use vdf_visibility::Method;
 
@@ -21,7 +21,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<(), Failure> {
     named.warn();
     if let Some(path) = &args.stats {
         named.check_outputs(&[("--stats", path)])?;
-        check_writable(path).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)?;
+        check_writable(path).with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)?;
     }
 
     let reporter = Reporter::new(args.quiet)?;

@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::Context as _;
-use vdf_image::write_atomically;
+use vdf_image::{shown, write_atomically};
 use vdf_lab::SceneVoxels;
 use vdf_render::PrepareOptions;
 use vdf_voxel::{VoxelGrid, VoxelSet, write_indices, write_obj};
@@ -30,7 +30,7 @@ pub(crate) fn run(args: &VoxelizeArgs) -> Result<(), Failure> {
     let mut written = Vec::new();
     if let Some(folder) = &args.export {
         fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))
+            .with_context(|| format!("cannot make the folder {}", shown(folder)))
             .map_err(Failure::Work)?;
         for (name, set) in sets(&voxels) {
             // Each file appears whole or not at all; those that are there stay.
@@ -61,7 +61,7 @@ fn export(folder: &Path, name: &str, grid: &VoxelGrid, set: &VoxelSet) -> Result
 }
 
 fn write(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    write_atomically(path, content).with_context(|| format!("cannot write {}", path.display())).map_err(Failure::Work)
+    write_atomically(path, content).with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)
 }
 
 fn summarize(args: &VoxelizeArgs, voxels: &SceneVoxels, written: &[PathBuf]) -> io::Result<()> {
@@ -80,5 +80,5 @@ fn summarize(args: &VoxelizeArgs, voxels: &SceneVoxels, written: &[PathBuf]) -> 
     }
     let steps: Vec<_> = voxels.build.parts.iter().map(|p| format!("{} {:.4} s", p.name, p.seconds)).collect();
     writeln!(out, "{:14} {}", args.method, steps.join(", "))?;
-    written.iter().try_for_each(|path| writeln!(out, "wrote          {}", path.display()))
+    written.iter().try_for_each(|path| writeln!(out, "wrote          {}", shown(path)))
 }

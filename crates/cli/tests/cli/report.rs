@@ -288,3 +288,11 @@ fn a_wrong_answer_fails() {
     let args = ["report", "queries", "--queries", "fog.vdfq", "--json", "r.json", "-q"];
     sandbox.fails(&[&args[..], &TINY[..4]].concat(), 1, &["WRONG ANSWER: none says", "of query 3, from ["]);
 }
+
+#[test]
+fn a_report_takes_the_sensor_that_it_is_told() {
+    let sandbox = Sandbox::new();
+    for report in ["queries", "convergence"] {
+        sandbox.fails(&["report", report, "cbox_vol6", "--sensor", "7"], 2, &["the scene has no sensor 7"]);
+    }
+}

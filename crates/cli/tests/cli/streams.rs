@@ -147,3 +147,34 @@ fn statistics_to_stdout() {
     let json = sandbox.render(&["--quiet", "--stats", "/dev/stdout"]).stdout;
     assert!(serde_json::from_str::<serde_json::Value>(&json).unwrap()["queries"].as_u64().unwrap() > 0);
 }
+
+/// A file that is larger than the shell's limit fails like one on a full disk, and nothing of it stays.
+#[test]
+fn files_beyond_the_limit_of_their_size() {
+    let sandbox = Sandbox::new();
+    // The limit counts blocks of 512 or 1024 bytes; the output is no file, so it has none.
+    let limited = |args: &str| {
+        let script = format!("ulimit -f 8; exec '{}' {args}", env!("CARGO_BIN_EXE_vdf"));
+        let output = Command::new("sh").args(["-c", &script]).current_dir(sandbox.path()).output().unwrap();
+        Outcome::new(&["sh", "-c", &script], &output)
+    };
+    let size = "-D width=128 -D height=128 --spp 1 --method none -q";
+    limited(&format!("render {size} -o a.exr")).failed(1, &["cannot write a.", "File too large"]);
+    assert!(sandbox.files().is_empty(), "{:?}", sandbox.files());
+    sandbox.render(&["-o", "a.exr", "-D", "width=16"]);
+    limited("scene write cbox_vol6 s").succeeded();
+    limited("scene write scape t").failed(1, &["File too large"]);
+    limited("voxelize --method amr --voxel 8 --export v").failed(1, &["cannot write v/occupied.obj: File too large"]);
+    assert_eq!(fs::read_dir(sandbox.path().join("v")).unwrap().count(), 0);
+}
+
+/// Work outside of a pool of ours would start rayon's own, which panics if it cannot have its threads.
+#[test]
+fn a_comparison_needs_no_threads_but_its_own() {
+    let sandbox = Sandbox::new();
+    sandbox.render(&["-o", "a.exr"]);
+    let mut command = sandbox.command(&["compare", "a.exr", "a.exr"]);
+    let output = command.env("RAYON_NUM_THREADS", "1000000").output().unwrap();
+    Outcome::new(&["compare"], &output)
+        .failed(1, &["cannot start the rendering threads: RAYON_NUM_THREADS must be at most 4096"]);
+}

@@ -31,8 +31,11 @@ pub fn read_exr(path: &Path) -> Result<Image, ImageError> {
     decode_exr(path, file, length)
 }
 
-/// Decodes an EXR of `length` bytes. `path` is for messages.
-pub(crate) fn decode_exr(path: &Path, mut file: impl BufRead + Seek, length: u64) -> Result<Image, ImageError> {
+/// Decodes an EXR of `length` bytes from anywhere, with the promises and the errors of [`read_exr`]. `path` is for messages.
+///
+/// # Errors
+/// Those of [`read_exr`].
+pub fn decode_exr(path: &Path, mut file: impl BufRead + Seek, length: u64) -> Result<Image, ImageError> {
     let malformed = |reason: &str| ImageError::Format { path: path.to_owned(), reason: reason.to_owned() };
     let failed = |error: Error| match error {
         Error::Io(source) => ImageError::Read { path: path.to_owned(), source },

@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::place::{folder, is_special, resolve};
+use super::shown;
 
 /// A file that would be written although it is also read, or would be written twice.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Conflict {
     /// An output would replace an input.
-    #[error("{output} would overwrite the input {}; give it another name", path.display())]
+    #[error("{output} would overwrite the input {}; give it another name", shown(path))]
     Input {
         /// The name of the output, as the caller gave it.
         output: String,
@@ -17,7 +18,7 @@ pub enum Conflict {
         path: PathBuf,
     },
     /// Two outputs would be the same file.
-    #[error("{first} and {second} both write {}; give one of them another name", path.display())]
+    #[error("{first} and {second} both write {}; give one of them another name", shown(path))]
     Outputs {
         /// The name of the one output, as the caller gave it.
         first: String,

@@ -9,6 +9,7 @@ use std::io::{self, BufWriter, Seek as _, Write};
 use std::path::{Path, PathBuf};
 
 use super::place::{folder, is_special, resolve};
+use super::shown;
 use super::temporaries::{Temporary, name, while_moving};
 
 /// A file that is written but has not appeared. Dropped, it is removed.
@@ -24,7 +25,7 @@ pub struct StagedFile {
 
 /// A file that was written whole but could not be moved to its place.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}", path.display())]
+#[error("cannot write {}", shown(path))]
 pub struct PersistError {
     /// The place.
     pub path: PathBuf,
@@ -143,7 +144,7 @@ impl StagedFile {
 fn with_undo(error: io::Error, undone: Result<(), PathBuf>) -> io::Error {
     match undone {
         Ok(()) => error,
-        Err(kept) => io::Error::new(error.kind(), format!("{error}; an older file is kept as {}", kept.display())),
+        Err(kept) => io::Error::new(error.kind(), format!("{error}; an older file is kept as {}", shown(&kept))),
     }
 }
 

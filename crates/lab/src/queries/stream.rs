@@ -127,8 +127,15 @@ impl QueryStream {
         let fail = |message: String| LabError::Queries { path: path.to_owned(), message };
         let file = File::open(path).map_err(|e| fail(e.to_string()))?;
         let length = file.metadata().map_err(|e| fail(e.to_string()))?.len();
-        let mut file = BufReader::new(file);
-        decode(&mut file, length).map_err(fail)
+        Self::decode(path, BufReader::new(file), length)
+    }
+
+    /// Decodes a stream of `length` bytes from anywhere. `path` is for messages.
+    ///
+    /// # Errors
+    /// Those of [`QueryStream::read`].
+    pub fn decode(path: &Path, mut bytes: impl Read, length: u64) -> Result<Self, LabError> {
+        decode(&mut bytes, length).map_err(|message| LabError::Queries { path: path.to_owned(), message })
     }
 
     /// Checks that the stream was recorded in `prepared`: a light that has moved, or another fog, gives other queries.

@@ -352,3 +352,55 @@ fn triangles_are_written_as_documented() {
     let last = prepared.world().triangles.last().unwrap().vertices[2];
     assert_eq!(u32_at(bytes.len() - 4), last.z.to_bits());
 }
+
+/// Files of the fuzzer's corpus, changed at random but always in the same way; with half of them the checksum is made right again, so that a change
+/// that makes sense is read.
+#[test]
+fn mutated_files_of_the_corpus_never_panic() {
+    const NUMBERS: [u64; 8] = [0, 1, 7, 0x7ff0_0000_0000_0000, 0x7ff8_0000_0000_0000, 1 << 31, 1 << 63, u64::MAX];
+    let mut state = 3_u64;
+    let mut below = |n: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % n.max(1)
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/queries");
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    assert!(paths.len() >= 2);
+    let (mut read, mut refused) = (0, 0);
+    for path in paths {
+        let original = std::fs::read(&path).unwrap();
+        assert!(QueryStream::decode(&path, &original[..], original.len() as u64).is_ok());
+        for case in 0..2000 {
+            let mut bytes = original.clone();
+            for _ in 0..=below(3) {
+                let at = below(bytes.len());
+                match below(5) {
+                    0 => bytes[at] = below(256) as u8,
+                    1 => bytes[at] ^= 1 << below(8),
+                    2 if at + 8 <= bytes.len() => bytes[at..at + 8].copy_from_slice(&NUMBERS[below(8)].to_le_bytes()),
+                    3 => bytes.truncate(at + 1),
+                    _ => bytes.extend([0; 56]),
+                }
+            }
+            if case % 2 == 0 && bytes.len() >= 80 {
+                let count = (bytes.len() as u64 - 80) / 56;
+                bytes.truncate(80 + 56 * count as usize);
+                bytes[16..24].copy_from_slice(&count.to_le_bytes());
+                let sum = crc32fast::hash(&bytes[80..]);
+                bytes[72..76].copy_from_slice(&sum.to_le_bytes());
+            }
+            match QueryStream::decode(&path, &bytes[..], bytes.len() as u64) {
+                Ok(stream) => {
+                    read += 1;
+                    assert!(stream.queries.iter().all(|q| q.from.is_finite() && q.to.is_finite()));
+                    assert!(stream.queries.iter().all(|q| q.emitter < stream.origin.emitters as usize));
+                }
+                Err(LabError::Queries { .. }) => refused += 1,
+                Err(e) => panic!("{e}"),
+            }
+        }
+    }
+    // Otherwise the changes are too strong to be read, or too weak to matter.
+    assert!(read > 200 && refused > 200, "{read} {refused}");
+}

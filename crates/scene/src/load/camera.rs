@@ -4,7 +4,7 @@ use glam::{DMat3, DMat4};
 
 use super::document::Element;
 use super::properties::Object;
-use super::{Loader, film, objects};
+use super::{Loader, features, film, objects};
 use crate::SceneError;
 use crate::{FilmSettings, PerspectiveSensor};
 
@@ -24,7 +24,7 @@ pub(super) struct Camera {
 
 /// Reads the sensor.
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<Camera, SceneError> {
-    let mut object = Object::new(loader, element, &["perspective"])?;
+    let mut object = Object::new(loader, element, features::kinds("sensor"))?;
     let world_from_camera = object.world_transform(loader)?;
     let world_from_camera = rigid(loader, &object, world_from_camera)?;
     object.without_effect(
@@ -112,8 +112,7 @@ fn field_of_view(object: &mut Object<'_>, aspect: f64) -> Result<f64, SceneError
 
 /// Samples per pixel and seed. All of Mitsuba's samplers stand for ours.
 fn sampler<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<(u32, u64), SceneError> {
-    let kinds = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"];
-    let mut object = Object::new(loader, element, &kinds)?;
+    let mut object = Object::new(loader, element, features::kinds("sampler"))?;
     let count = object.integer("sample_count", 4, 1..=i64::from(u32::MAX))?;
     let seed = object.integer("seed", 0, 0..=i64::MAX)?;
     if matches!(object.kind(), "stratified" | "multijitter" | "orthogonal") {

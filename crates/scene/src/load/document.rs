@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::features::FOREIGN_TAGS;
 use super::names;
 use crate::SceneError;
 
@@ -76,7 +77,8 @@ impl Element {
 
     /// True if it describes an object rather than a property.
     pub(super) fn is_object(&self) -> bool {
-        self.tag == "shape" || OBJECT_TAGS.contains(&self.tag.as_str())
+        let tag = self.tag.as_str();
+        tag == "shape" || OBJECT_TAGS.contains(&tag) || FOREIGN_TAGS.contains(&tag)
     }
 
     fn contains(&self, serial: usize) -> bool {

@@ -1,21 +1,15 @@
 //! Film and reconstruction filter.
 
-use super::Loader;
 use super::document::Element;
 use super::properties::Object;
+use super::{Loader, features};
 use crate::{ComponentFormat, FilmSettings, PixelRect, ReconstructionFilter, SceneError};
 
 const MAX_FILM_SIZE: i64 = 1 << 16;
 
 /// Reads the film.
 pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<FilmSettings, SceneError> {
-    if element.attribute("type").is_some_and(|kind| kind.value == "specfilm") {
-        return Err(element.at.error(
-            "film \"specfilm\" is not supported: it records a spectrum, and vdf renders red, green and blue",
-            "write <film type=\"hdrfilm\">",
-        ));
-    }
-    let mut object = Object::new(loader, element, &["hdrfilm"])?;
+    let mut object = Object::new(loader, element, features::kinds("film"))?;
     let width = object.integer("width", 768, 1..=MAX_FILM_SIZE)?;
     let height = object.integer("height", 576, 1..=MAX_FILM_SIZE)?;
     let x0 = object.integer("crop_offset_x", 0, 0..=width - 1)?;
@@ -59,8 +53,7 @@ fn pixels(n: i64) -> u32 {
 
 fn read_filter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<ReconstructionFilter, SceneError> {
     const THIRD: f64 = 1.0 / 3.0;
-    let kinds = ["box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"];
-    let mut object = Object::new(loader, element, &kinds)?;
+    let mut object = Object::new(loader, element, features::kinds("rfilter"))?;
     let size = |v: f64| v > 0.0 && v <= 64.0;
     let range = "positive and at most 64";
     let filter = match object.kind() {

@@ -1,14 +1,12 @@
 //! The integrator, under all the names that Mitsuba has for one that does what ours does.
 
-use super::Loader;
 use super::document::Element;
 use super::properties::Object;
+use super::{Loader, features};
 use crate::{IntegratorSettings, SceneError};
 
 /// What only asks for a second result next to the picture.
 const WRAPPERS: [&str; 3] = ["moment", "aov", "stokes"];
-const KINDS: [&str; 10] =
-    ["volpath", "volpathmis", "path", "direct", "prb", "prbvolpath", "prb_basic", "moment", "aov", "stokes"];
 /// The integrators that differentiate have this limit by default.
 const MAX_DEPTH_OF_PRB: i64 = 6;
 /// So many wrappers may be around an integrator.
@@ -21,7 +19,7 @@ pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Inte
 }
 
 fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> Result<IntegratorSettings, SceneError> {
-    let mut object = Object::new(loader, element, &KINDS)?;
+    let mut object = Object::new(loader, element, features::kinds("integrator"))?;
     // How Mitsuba cuts up its work and what it differentiates; no meaning here.
     object.integer("block_size", 0, 0..=i64::MAX)?;
     object.integer("samples_per_pass", 0, 0..=i64::MAX)?;
@@ -30,7 +28,12 @@ fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> R
     if WRAPPERS.contains(&object.kind()) {
         return wrapped(loader, object, depth);
     }
-    object.fixed("hide_emitters", false)?;
+    if object.boolean("hide_emitters", false)? {
+        loader.warn(
+            object.place_of("hide_emitters"),
+            "\"hide_emitters\" has no effect here: the camera sees the emitters",
+        );
+    }
     if matches!(object.kind(), "path" | "direct" | "prb" | "prb_basic") && !loader.media.is_empty() {
         let message = format!("{} ignores media in Mitsuba; vdf renders them, as volpath does", object.describe());
         loader.warn(&element.at, &message);

@@ -3,6 +3,7 @@
 mod camera;
 mod checks;
 mod document;
+mod features;
 mod film;
 mod integrator;
 mod lines;
@@ -70,6 +71,7 @@ impl Scene {
         let mut parameters = Parameters::new(&options.defines)?;
         let (root, search) = reader::read(source, &mut parameters)?;
         parameters.check_all_used()?;
+        features::check(&root, options.sensor.unwrap_or(0))?;
         let loader = Loader {
             source,
             search,

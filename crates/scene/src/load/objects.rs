@@ -1,8 +1,8 @@
 //! Media, BSDFs and emitters.
 
-use super::Loader;
 use super::document::Element;
 use super::properties::Object;
+use super::{Loader, features};
 use crate::{Bsdf, Emitter, Medium, MediumId, Phase};
 use crate::{Rgb, SceneError};
 
@@ -11,7 +11,7 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
     if let Some(&id) = loader.medium_of_element.get(&element.serial) {
         return Ok(id);
     }
-    let mut object = Object::new(loader, element, &["homogeneous"])?;
+    let mut object = Object::new(loader, element, features::kinds("medium"))?;
     object.fixed("sample_emitters", true)?;
     object.boolean("has_spectral_extinction", true)?;
     let albedo = object.reflectance("albedo", 0.75)?;
@@ -36,7 +36,7 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
 
 /// A phase function.
 pub(super) fn phase<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Phase, SceneError> {
-    let mut object = Object::new(loader, element, &["isotropic", "hg"])?;
+    let mut object = Object::new(loader, element, features::kinds("phase"))?;
     let phase = if object.kind() == "hg" {
         Phase::HenyeyGreenstein {
             g: object.float_where("g", 0.8, |g| g > -1.0 && g < 1.0, "between -1 and 1, both excluded")?,
@@ -55,7 +55,7 @@ pub(super) fn default_bsdf(emits: bool) -> Bsdf {
 
 /// A BSDF; `None` is `null`.
 pub(super) fn bsdf<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Bsdf>, SceneError> {
-    let mut object = Object::new(loader, element, &["diffuse", "twosided", "null"])?;
+    let mut object = Object::new(loader, element, features::kinds("bsdf"))?;
     let bsdf = match object.kind() {
         "diffuse" => Some(Bsdf { front: object.reflectance("reflectance", 0.5)?, back: Rgb::ZERO }),
         "twosided" => {
@@ -85,7 +85,7 @@ fn diffuse<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneEr
 
 /// An emitter that stands by itself; `None` for an area light, which shines where a shape refers to it.
 pub(super) fn emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Emitter>, SceneError> {
-    let mut object = Object::new(loader, element, &["point", "constant", "area"])?;
+    let mut object = Object::new(loader, element, features::kinds("emitter"))?;
     let emitter = match object.kind() {
         "area" if element.attribute("id").is_none() => {
             return Err(object.error("it belongs to no shape", "put it inside the <shape> that shines"));

@@ -6,7 +6,7 @@ use glam::{DMat4, DVec3};
 
 use super::Loader;
 use super::document::{Element, Place};
-use super::{names, transform};
+use super::{features, names, transform};
 use crate::{Rgb, SceneError};
 
 /// The colour of the spectrum that is 1 at each wavelength, with the primaries of sRGB and its white, D65; as Mitsuba 3.9.1 has it.
@@ -39,10 +39,7 @@ impl<'a> Object<'a> {
     pub(super) fn new(loader: &Loader<'a>, element: &'a Element, kinds: &[&str]) -> Result<Self, SceneError> {
         let kind = element.require("type")?;
         if !kinds.contains(&kind) {
-            let at = element.attribute("type").map_or(&element.at, |a| &a.at);
-            return Err(
-                at.error(format!("{} type \"{kind}\" is not supported", element.tag), names::suggest(kind, kinds))
-            );
+            return Err(features::unsupported(element, kind, kinds));
         }
         let mut seen = HashSet::new();
         let mut children = Vec::new();
@@ -233,12 +230,7 @@ impl<'a> Object<'a> {
         }
         let value = rgb(element)?;
         if value.x != value.y || value.y != value.z {
-            return Err(element.at.error(
-                format!("chromatic {name} ({}, {}, {}) is not supported", value.x, value.y, value.z),
-                format!(
-                    "give the three channels one value, or write <float name=\"{name}\" …>; the albedo may be chromatic"
-                ),
-            ));
+            return Err(features::chromatic(element));
         }
         if value.x > 1.0 {
             return Err(element.at.error(
@@ -312,15 +304,9 @@ fn number(element: &Element) -> Result<f64, SceneError> {
     transform::parse(element.require("value")?, &element.at)
 }
 
+/// A spectrum that is the same at each wavelength; there are no others after the check of features.
 fn constant_spectrum(element: &Element) -> Result<f64, SceneError> {
-    let text = element.require("value")?;
-    if text.contains(':') || text.trim().contains([',', ' ']) {
-        return Err(element.at.error(
-            "a <spectrum> over wavelengths is not supported",
-            "write one number, or the colour as <rgb name=\"…\" value=\"red, green, blue\"/>",
-        ));
-    }
-    transform::parse(text, &element.at)
+    transform::parse(element.require("value")?, &element.at)
 }
 
 fn parse_integer(element: &Element) -> Result<i64, SceneError> {

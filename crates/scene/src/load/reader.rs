@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::document::{Attribute, Element, OBJECT_TAGS, PROPERTY_TAGS, Place};
+use super::features::FOREIGN_TAGS;
 use super::lines::Lines;
 use super::parameters::Parameters;
 use super::search::{Search, sibling};
@@ -119,7 +120,13 @@ impl Reader<'_> {
                 }
             }
             if child.is_element() {
-                if !element.is_object() && !matches!(element.tag.as_str(), "scene" | "transform") {
+                // A spectrum with a type is refused as a whole, with what it holds.
+                let may_hold = match element.tag.as_str() {
+                    "scene" | "transform" => true,
+                    "spectrum" => element.attribute("type").is_some(),
+                    _ => element.is_object(),
+                };
+                if !may_hold {
                     let at = lines.place(child.range().start);
                     return Err(at.error(
                         format!("an element inside <{}>", element.tag),
@@ -221,8 +228,9 @@ fn allowed_attributes(tag: &str, at: &Place) -> Result<&'static [&'static str], 
         "alias" => &["id", "as"],
         "ref" => &["id", "name"],
         "shape" => &["type", "id", "name"],
-        _ if OBJECT_TAGS.contains(&tag) => &["type", "id", "name"],
-        "boolean" | "integer" | "float" | "string" | "rgb" | "spectrum" => &["name", "value"],
+        _ if OBJECT_TAGS.contains(&tag) || FOREIGN_TAGS.contains(&tag) => &["type", "id", "name"],
+        "boolean" | "integer" | "float" | "string" | "rgb" => &["name", "value"],
+        "spectrum" => &["name", "value", "type", "filename"],
         "vector" | "point" => &["name", "value", "x", "y", "z"],
         "transform" => &["name"],
         "translate" | "scale" => &["x", "y", "z", "value"],

@@ -134,7 +134,7 @@ fn unknown_names_are_refused_with_the_nearest_one() {
     refused("<shape type='cube'><string name='flip_normals' value='a'/></shape>", "3:20", "cannot be a <string>");
     refused("<film type='hdrfilm'/>", "3:1", "inside <sensor>");
     refused("<float name='a' value='1'><float name='b' value='1'/></float>", "3:27", "inside <float>");
-    refused("<texture name='a' value='1'/>", "3:1", "not supported");
+    refused("<texture type='bitmap' id='a'/>", "3:10", "texture type \"bitmap\" is not supported");
 }
 
 #[test]

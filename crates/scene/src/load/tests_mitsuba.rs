@@ -93,7 +93,7 @@ fn films_and_filters_are_read() {
             .is_empty()
     );
     let spectral = format!("{HEAD}<sensor type='perspective'><film type='specfilm'/></sensor></scene>");
-    refused_text(&spectral, &[], "s.xml:3:28", "specfilm");
+    refused_text(&spectral, &[], "s.xml:3:34", "records a spectrum");
 }
 
 #[test]
@@ -226,4 +226,37 @@ fn an_area_light_with_a_null_bsdf_is_a_black_one() {
     assert_eq!((loaded.surfaces[0].bsdf.front, loaded.surfaces[0].bsdf.back), (Vec3::ZERO, Vec3::ZERO));
     assert_eq!(loaded.emitters[0], Emitter::Area { surface: 0 });
     assert!(warned(&loaded, "opaque and black") && loaded.boundaries.is_empty());
+}
+
+#[test]
+fn all_features_that_a_scene_lacks_are_named_at_once() {
+    let body = "<emitter type='envmap'><string name='filename' value='a.exr'/></emitter>\n\
+         <shape type='ply'><string name='filename' value='none.ply'/><bsdf type='twosided'><bsdf type='plastic'>\
+         <texture type='bitmap' name='diffuse_reflectance'/></bsdf></bsdf></shape>\n\
+         <shape type='ply'><string name='filename' value='none.ply'/></shape>\n\
+         <bsdf type='diffuse' id='a'><spectrum name='reflectance' value='400:1, 700:2'/></bsdf>\n\
+         <bsdf type='diffuse' id='b'><spectrum name='reflectance' type='d65'><float name='scale' value='1'/></spectrum></bsdf>\n\
+         <bsdf type='diffuse' id='c'><spectrum name='reflectance' filename='a.spd'/></bsdf>\n\
+         <medium type='homogeneous'><rgb name='sigma_t' value='1 2 3'/></medium>";
+    let list = "8 features of this scene are not supported: emitter \"envmap\" (s.xml:3), shape \"ply\" (s.xml:4 and 1 more), \
+                bsdf \"plastic\" (s.xml:4), texture \"bitmap\" (s.xml:4), spectra over wavelengths (s.xml:6), \
+                spectrum \"d65\" (s.xml:7), spectra in files (s.xml:8), chromatic sigma_t (s.xml:9)\n";
+    refused(body, "3:1", list);
+    refused(body, "3:1", "supported: bsdf diffuse, twosided, null; emitter point, constant, area; shape obj");
+    // One alone has its own message, before any file is looked for.
+    let ply = "<shape type='obj'><string name='filename' value='none.obj'/></shape><shape type='ply'/>";
+    refused(ply, "3:76", "shape type \"ply\" is not supported\n  help: supported: obj");
+    refused("<bsdf type='diffuse'><spectrum name='reflectance' type='d65'/></bsdf>", "3:51", "spectrum \"d65\" is not");
+    // A camera that is not used needs nothing.
+    let cameras = format!("{LIGHT}<sensor type='thinlens'/><sensor type='perspective'>{FILM}</sensor></scene>");
+    let text = format!("{HEAD}{cameras}");
+    refused_text(&text, &[], "s.xml:3:32", "sensor type \"thinlens\"");
+    let options = LoadOptions { sensor: Some(1), ..LoadOptions::default() };
+    assert!(Scene::from_source(&SceneSource::embedded(file("s.xml", &text), vec![]), &options).is_ok());
+}
+
+#[test]
+fn emitters_that_should_be_hidden_are_seen_and_a_warning_says_so() {
+    let text = with_integrator("<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>", "");
+    assert!(warned(&load_with(&text, &[], &[]).unwrap(), "\"hide_emitters\" has no effect"));
 }

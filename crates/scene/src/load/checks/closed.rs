@@ -1,6 +1,7 @@
 //! A medium boundary that separates an inside from an outside.
 
 use glam::DVec3;
+use robust::{Coord3D, orient3d};
 use vdf_geometry::{Bounds, Triangle};
 
 use super::super::document::Element;
@@ -10,6 +11,10 @@ use crate::{Boundary, MediumId};
 const MAX_PROBES: usize = 16;
 /// Points along each axis of the box in which two boundaries may overlap.
 const GRID: u32 = 4;
+/// So many pairs of an edge and a face are looked at for two boundaries, some milliseconds.
+const MOST_PAIRS: usize = 1_000_000;
+/// What reaches through a face by less than this share of the larger boundary only touches it: single precision has moved it.
+const TOUCHING: f64 = 1e-5;
 
 /// How many triangles may still be looked at for the comparison of boundaries; some nanoseconds each.
 #[derive(Debug)]
@@ -97,7 +102,9 @@ impl<'a> Closed<'a> {
         Some(inside)
     }
 
-    /// True if a part of each is inside the other, and a part of each is not, as far as a grid of points shows; `None` if the work is used up.
+    /// True if a part of each is inside the other, and a part of each is not; `None` if the work is used up. A grid of points shows it where much is
+    /// shared. Where that shows nothing, an edge of one that goes through a face of the other does, if there are no more than
+    /// [`MOST_PAIRS`] of edges and faces where their boxes overlap. What overlaps by less than rounding only touches.
     pub(super) fn crosses(&self, other: &Self, work: &mut Work) -> Option<bool> {
         let (low, high) = (self.bounds.min.max(other.bounds.min), self.bounds.max.min(other.bounds.max));
         if !low.cmplt(high).all() {
@@ -111,22 +118,69 @@ impl<'a> Closed<'a> {
             }
             let cell = DVec3::new(f64::from(i % GRID), f64::from(i / GRID % GRID), f64::from(i / GRID / GRID));
             let p = low + (high - low) * (cell + 0.5) / f64::from(GRID);
-            match (self.winding(p).abs() > 0.5, other.winding(p).abs() > 0.5) {
-                (true, true) => shared = true,
-                (true, false) => mine = true,
-                (false, true) => theirs = true,
-                (false, false) => {}
-            }
+            // A point on a surface, where the winding is a half, is neither in nor out.
+            let (of_mine, of_theirs) = (self.winding(p).abs(), other.winding(p).abs());
+            shared |= of_mine > 0.75 && of_theirs > 0.75;
+            mine |= of_mine > 0.75 && of_theirs < 0.25;
+            theirs |= of_mine < 0.25 && of_theirs > 0.75;
             if shared && mine && theirs {
                 return Some(true);
             }
         }
-        Some(false)
+        self.pierces(other, low, high, work)
+    }
+
+    /// True if an edge of one goes through a face of the other between these corners.
+    fn pierces(&self, other: &Self, low: DVec3, high: DVec3, work: &mut Work) -> Option<bool> {
+        let within = |corners: &[DVec3]| {
+            let bounds = Bounds::of_points(corners.iter().copied());
+            bounds.min.cmple(high).all() && bounds.max.cmpge(low).all()
+        };
+        let faces = |closed: &Self| -> Vec<[DVec3; 3]> {
+            closed.triangles.iter().map(Triangle::vertices_f64).filter(|face| within(face)).collect()
+        };
+        let edges = |faces: &[[DVec3; 3]]| -> Vec<[DVec3; 2]> {
+            // Each edge has two faces and comes once from each, the other way round.
+            let of_face = |&[a, b, c]: &[DVec3; 3]| [[a, b], [b, c], [c, a]];
+            let is_first = |[a, b]: &[DVec3; 2]| a.to_array() < b.to_array();
+            faces.iter().flat_map(of_face).filter(|edge| is_first(edge) && within(edge)).collect()
+        };
+        let (mine, theirs) = (faces(self), faces(other));
+        let (my_edges, their_edges) = (edges(&mine), edges(&theirs));
+        let pairs = my_edges.len() * theirs.len() + their_edges.len() * mine.len();
+        if pairs > MOST_PAIRS {
+            return Some(false);
+        }
+        if !work.spend(pairs) {
+            return None;
+        }
+        let touching = TOUCHING * self.bounds.extent().max(other.bounds.extent()).max_element();
+        let any = |edges: &[[DVec3; 2]], faces: &[[DVec3; 3]]| {
+            edges.iter().any(|edge| faces.iter().any(|face| goes_through(edge, face, touching)))
+        };
+        Some(any(&my_edges, &theirs) || any(&their_edges, &mine))
     }
 
     fn reaches_beyond(&self, low: DVec3, high: DVec3) -> bool {
         self.bounds.min.cmplt(low).any() || self.bounds.max.cmpgt(high).any()
     }
+}
+
+/// True if the edge has its ends on both sides of the face and meets it inside of its border, all that by more than `touching`.
+fn goes_through(&[a, b]: &[DVec3; 2], &[p, q, r]: &[DVec3; 3], touching: f64) -> bool {
+    let side = |p: DVec3, q: DVec3, r: DVec3, s: DVec3| {
+        let coord = |v: DVec3| Coord3D { x: v.x, y: v.y, z: v.z };
+        orient3d(coord(p), coord(q), coord(r), coord(s))
+    };
+    let (of_a, of_b) = (side(p, q, r, a), side(p, q, r, b));
+    // Six times a volume: the height over twice the area.
+    let least = touching * (q - p).cross(r - p).length();
+    if of_a.abs().min(of_b.abs()) <= least || (of_a > 0.0) == (of_b > 0.0) {
+        return false;
+    }
+    // The volume between two lines: their distance times the product of their directions.
+    let around = [[p, q], [q, r], [r, p]].map(|[p, q]| (side(a, b, p, q), touching * (b - a).cross(q - p).length()));
+    around.iter().all(|&(side, least)| side > least) || around.iter().all(|&(side, least)| side < -least)
 }
 
 fn centre(triangle: &Triangle) -> DVec3 {

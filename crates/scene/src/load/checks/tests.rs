@@ -107,6 +107,26 @@ fn crossing_boxes_of_different_media_are_warned_about() {
     }
 }
 
+/// An edge that reaches into the other box by a fortieth of its size shows between no points of a grid; boxes that touch share nothing but rounding.
+#[test]
+fn slight_crossings_are_told_from_touching_boxes() {
+    let turned = |ops: &str, more: &str| format!("{ops}<rotate x='0.6' z='0.8' angle='37'/><translate {more}/>");
+    for place in ["x='0'", "x='1000' y='-700'"] {
+        let pair = |ops: &str| {
+            let first = fog_box("fog", &turned("<scale value='2'/>", place), "");
+            seen(&format!("{first}{}", fog_box("other", &turned(ops, place), "")))
+        };
+        for reach in [0.05, 0.5] {
+            let ops = format!("<rotate z='1' angle='45'/><translate x='{}'/>", 2.0 + 2_f64.sqrt() - reach);
+            assert!(warned(&pair(&ops), "5:1", "its medium crosses"), "{place} {reach}");
+        }
+        for touching in ["<translate x='3'/>", "<translate x='3' y='1'/>", "<scale value='2'/><translate x='4'/>"] {
+            let scene = pair(touching);
+            assert!(!scene.warnings.iter().any(|w| w.contains("crosses")), "{place} {touching}: {:?}", scene.warnings);
+        }
+    }
+}
+
 /// Two copies of one fog are one fog.
 #[test]
 fn equal_media_are_one_medium() {

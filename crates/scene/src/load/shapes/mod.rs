@@ -11,13 +11,13 @@ use placement::Placement;
 use super::document::Element;
 use super::objects;
 use super::properties::Object;
-use super::{Loader, names};
+use super::{Loader, features, names};
 use crate::{Boundary, Bsdf, Emitter, MediumId, Surface};
 use crate::{Rgb, SceneError};
 
 /// Reads a shape into the scene.
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<(), SceneError> {
-    let mut object = Object::new(loader, element, &["obj", "cube", "rectangle"])?;
+    let mut object = Object::new(loader, element, features::kinds("shape"))?;
     let to_world = object.world_transform(loader)?;
     let flip = object.boolean("flip_normals", false)?;
     let mut placed = Placement::new(to_world);

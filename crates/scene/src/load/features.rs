@@ -1,0 +1,171 @@
+//! What of Mitsuba's features is read, and what a scene needs beyond that: all of it at once, for whoever has to decide whether to convert a
+//! scene wants the whole list, not its first item.
+
+use std::collections::HashMap;
+
+use super::document::{Element, Place};
+use super::{names, transform};
+use crate::SceneError;
+use crate::text::quoted;
+
+/// Objects of Mitsuba's that are known, but not read at all.
+pub(super) const FOREIGN_TAGS: [&str; 2] = ["texture", "volume"];
+/// More features are counted, not named.
+const MOST_NAMED: usize = 12;
+
+/// The plugins that are read for objects of that tag.
+pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
+    match tag {
+        "bsdf" => &["diffuse", "twosided", "null"],
+        "emitter" => &["point", "constant", "area"],
+        "film" => &["hdrfilm"],
+        "integrator" => {
+            &["volpath", "volpathmis", "path", "direct", "prb", "prbvolpath", "prb_basic", "moment", "aov", "stokes"]
+        }
+        "medium" => &["homogeneous"],
+        "phase" => &["isotropic", "hg"],
+        "rfilter" => &["box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"],
+        "sampler" => &["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
+        "sensor" => &["perspective"],
+        "shape" => &["obj", "cube", "rectangle"],
+        _ => &[],
+    }
+}
+
+/// The error that an object is of a kind that is not one of `kinds`.
+pub(super) fn unsupported(element: &Element, kind: &str, kinds: &[&str]) -> SceneError {
+    let at = element.attribute("type").map_or(&element.at, |a| &a.at);
+    let (tag, mut help) = (&element.tag, names::suggest(kind, kinds));
+    match (tag.as_str(), kind) {
+        ("film", "specfilm") => {
+            help =
+                "it records a spectrum, and vdf renders red, green and blue: write <film type=\"hdrfilm\">".to_owned();
+        }
+        ("texture" | "volume", _) => help = format!("write a value in place of the {tag}, as <rgb> or <float>"),
+        _ => {}
+    }
+    at.error(format!("{tag} type \"{kind}\" is not supported"), help)
+}
+
+/// The error that the channels of a colour differ where they must be equal.
+pub(super) fn chromatic(element: &Element) -> SceneError {
+    let text = |name| element.attribute(name).map_or("", |a| a.value.as_str());
+    let name = text("name");
+    element.at.error(
+        format!("chromatic {name} ({}) is not supported", quoted(text("value"))),
+        format!("give the three channels one value, or write <float name=\"{name}\" …>; the albedo may be chromatic"),
+    )
+}
+
+/// A kind of thing that the scene has and that is not read.
+struct Feature<'a> {
+    name: String,
+    /// The first of them.
+    element: &'a Element,
+    count: usize,
+}
+
+/// An error if the scene needs features that are not read; it names all of them. Of the sensors only the one with the index `sensor` counts. What
+/// is written wrongly in other ways is left to those who read it.
+pub(super) fn check(root: &Element, sensor: usize) -> Result<(), SceneError> {
+    let mut features = Features::default();
+    let mut sensors = 0;
+    for child in &root.children {
+        if child.tag == "sensor" {
+            sensors += 1;
+            if sensors != sensor + 1 {
+                continue;
+            }
+        }
+        features.visit(child);
+    }
+    match features.found.as_slice() {
+        [] => Ok(()),
+        [one] => Err(one.error()),
+        several => Err(all(several)),
+    }
+}
+
+#[derive(Default)]
+struct Features<'a> {
+    found: Vec<Feature<'a>>,
+    by_name: HashMap<String, usize>,
+}
+
+impl<'a> Features<'a> {
+    fn visit(&mut self, element: &'a Element) {
+        if let Some(name) = feature(element) {
+            let next = self.found.len();
+            let index = *self.by_name.entry(name.clone()).or_insert(next);
+            if index == next {
+                self.found.push(Feature { name, element, count: 0 });
+            }
+            self.found[index].count += 1;
+        }
+        for child in &element.children {
+            self.visit(child);
+        }
+    }
+}
+
+/// What the element is, if that is not read.
+fn feature(element: &Element) -> Option<String> {
+    let kind = element.attribute("type").map(|kind| kind.value.as_str());
+    match (element.tag.as_str(), kind) {
+        ("spectrum", Some(kind)) => Some(format!("spectrum {}", quoted(kind))),
+        ("spectrum", None) if element.attribute("filename").is_some() => Some("spectra in files".to_owned()),
+        ("spectrum", None) if is_over_wavelengths(element) => Some("spectra over wavelengths".to_owned()),
+        ("rgb", _) if is_chromatic_extinction(element) => Some("chromatic sigma_t".to_owned()),
+        (tag, Some(kind)) if element.is_object() && !kinds(tag).contains(&kind) => {
+            Some(format!("{tag} {}", quoted(kind)))
+        }
+        _ => None,
+    }
+}
+
+/// True for a `<spectrum>` of more than one number.
+fn is_over_wavelengths(element: &Element) -> bool {
+    element
+        .attribute("value")
+        .is_some_and(|v| v.value.trim().contains(|c: char| c == ':' || c == ',' || c.is_whitespace()))
+}
+
+fn is_chromatic_extinction(element: &Element) -> bool {
+    let is_extinction = element.attribute("name").is_some_and(|name| name.value == "sigma_t");
+    is_extinction && transform::numbers(element, "value").is_ok_and(|v| matches!(v[..], [x, y, z] if x != y || y != z))
+}
+
+impl Feature<'_> {
+    /// The error of a scene that lacks nothing but this.
+    fn error(&self) -> SceneError {
+        let (element, kind) = (self.element, self.element.attribute("type"));
+        let colour = "write one number, or the colour as <rgb name=\"…\" value=\"red, green, blue\"/>";
+        match (element.tag.as_str(), kind) {
+            ("spectrum", Some(kind)) => kind.at.error(format!("{} is not supported", self.name), colour),
+            ("spectrum", None) => element.at.error(format!("{} are not supported", self.name), colour),
+            ("rgb", _) => chromatic(element),
+            (tag, kind) => unsupported(element, kind.map_or("", |kind| &kind.value), kinds(tag)),
+        }
+    }
+}
+
+/// The error that names them all.
+fn all(features: &[Feature<'_>]) -> SceneError {
+    let item = |feature: &Feature<'_>| {
+        let Place { file, line, .. } = &feature.element.at;
+        let more = if feature.count > 1 { format!(" and {} more", feature.count - 1) } else { String::new() };
+        format!("{} ({}:{line}{more})", feature.name, file.file_name().unwrap_or_default().to_string_lossy())
+    };
+    let mut list: Vec<String> = features.iter().take(MOST_NAMED).map(item).collect();
+    if features.len() > MOST_NAMED {
+        list.push(format!("and {} more", features.len() - MOST_NAMED));
+    }
+    let mut tags: Vec<&str> =
+        features.iter().map(|f| f.element.tag.as_str()).filter(|tag| !kinds(tag).is_empty()).collect();
+    tags.sort_unstable();
+    tags.dedup();
+    let supported: Vec<String> = tags.iter().map(|tag| format!("{tag} {}", kinds(tag).join(", "))).collect();
+    let help = if supported.is_empty() { String::new() } else { format!("supported: {}", supported.join("; ")) };
+    let message = format!("{} features of this scene are not supported: {}", features.len(), list.join(", "));
+    features[0].element.at.error(message, help)
+}
