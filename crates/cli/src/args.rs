@@ -258,7 +258,7 @@ pub(crate) struct VoxelizeArgs {
     #[arg(long, value_enum, default_value_t = GridName::Occluders)]
     pub(crate) grid: GridName,
     /// Method that proves which voxels see a light
-    #[arg(long, default_value_t, value_name = "METHOD", value_parser = method_parser())]
+    #[arg(long, default_value_t = Method::best_with_voxels(), value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Method,
     /// Folder to write the voxels to; made if it does not exist
     #[arg(long, value_name = "DIR")]
