@@ -75,6 +75,8 @@ pub struct FilmOrigin {
     pub integrator: Integrator,
     /// Name of the estimator of transmittance.
     pub transmittance: &'static str,
+    /// Name of the roulette.
+    pub roulette: &'static str,
     /// Seed of the render.
     pub seed: u64,
     /// Width and height of the full film in pixels.
