@@ -54,7 +54,11 @@ mod tests {
         let (mut left, mut edges, mut open) = (0, 0, 0);
         for _ in 0..200_000 {
             let coarse = rng.bool();
-            let mut end = || [0; 3].map(|_: i64| if coarse { 8 * rng.i64(0..=SIDE) + 4 * rng.i64(0..2) } else { rng.i64(0..=8 * SIDE) });
+            let mut end = || {
+                [0; 3].map(
+                    |_: i64| if coarse { 8 * rng.i64(0..=SIDE) + 4 * rng.i64(0..2) } else { rng.i64(0..=8 * SIDE) },
+                )
+            };
             let (a, b) = (end().map(|c| c.min(8 * SIDE)), end().map(|c| c.min(8 * SIDE)));
             let point = |p: [i64; 3]| DVec3::from_array(p.map(|c| c as f64 / 8.0));
             let found = grid.leaves_through(point(a), point(b));

@@ -346,7 +346,8 @@ const MANY_EVENTS: u32 = 1 << 16;
 #[inline]
 fn survives(path: &mut Path, roulette: Roulette, rr_depth: u32, sampler: &mut Sampler) -> bool {
     let thesis = roulette == Roulette::Thesis;
-    let spared = if thesis { path.depth == 0 || path.depth + path.crossings < rr_depth } else { path.depth <= rr_depth };
+    let spared =
+        if thesis { path.depth == 0 || path.depth + path.crossings < rr_depth } else { path.depth <= rr_depth };
     if spared {
         return true;
     }
