@@ -13,7 +13,7 @@
 //!   of freedom, half of them one-sided: 9·10⁻⁴).
 //!
 //! Next-event estimation towards a point light in fog has infinite variance close to the light, so blocks whose reference is not known to
-//! 1 % are left out. Seeds are fixed, so a test that passes keeps passing. `VDF_MITSUBA_SAMPLES=16` takes 16 times as many samples.
+//! 1 % are left out (5 % where only the image is compared). Seeds are fixed, so a test that passes keeps passing. `VDF_MITSUBA_SAMPLES=16` takes 16 times as many samples.
 
 mod common;
 
@@ -62,9 +62,9 @@ const CASES: [Case; 25] = [
     // become rare as r². An estimate of it says nothing.
     case("cbox_vol2", 8, Means),
     case("cbox_vol3", 8, Means),
-    case("cbox_vol6", 8, Means),
-    // Here that is most of the light: block means are far from normal (two of our own renders differ by 5 of the standard errors that
-    // their samples suggest).
+    // Here that is most of the light, or the whole room sees it: block means are far from normal (two of our own renders of `cbox_vol4` differ by
+    // 5 of the standard errors that their samples suggest).
+    case("cbox_vol6", 8, OnlyImage),
     case("cbox_vol4", 8, OnlyImage),
     case("area_light", 2, Everything),
     case("area_light", 8, Everything),
@@ -215,8 +215,14 @@ struct Comparison {
 /// Mitsuba sums up to 1024 samples in single precision, each sum rounding by 2⁻²⁵ on the average.
 const ROUNDING: f64 = 1.0 / 32_768.0;
 
-fn compare(ours: &Blocks, theirs: &Blocks) -> Comparison {
-    let known = |i: &usize| theirs.variance[*i].sqrt() <= 0.01 * theirs.mean[*i];
+/// Blocks whose reference is not known so well are left out. Where single blocks are not compared it may be worse: a ratio to a mean with the
+/// relative error e is too large by e², less than 3·10⁻³ of it at the worst and below the standard error of the image in `cbox_vol4`, 4·10⁻³.
+fn largest_error(compared: Compared) -> f64 {
+    if compared == OnlyImage { 0.05 } else { 0.01 }
+}
+
+fn compare(ours: &Blocks, theirs: &Blocks, compared: Compared) -> Comparison {
+    let known = |i: &usize| theirs.variance[*i].sqrt() <= largest_error(compared) * theirs.mean[*i];
     // A block that sees only the background has no noise.
     let noisy = |i: &usize| known(i) && theirs.variance[*i] > 0.0 && ours.variance[*i] > 0.0;
     let all = 0..GRID * GRID * 3;
@@ -334,7 +340,7 @@ fn check(
     transmittance: TransmittanceEstimator,
     record: &serde_json::Value,
 ) -> Vec<String> {
-    let comparison = compare(&ours(case.scene, case.depth, transmittance), &theirs(reference, record));
+    let comparison = compare(&ours(case.scene, case.depth, transmittance), &theirs(reference, record), case.compared);
     println!("{}", comparison.row(case, transmittance));
     comparison.complaints(case, transmittance)
 }

@@ -6,7 +6,8 @@ pub mod statistics;
 use vdf::{
     geometry::Triangle,
     render::{
-        Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, TransmittanceEstimator,
+        Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, Roulette,
+        TransmittanceEstimator,
     },
     scene::{
         Boundary, ComponentFormat, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, PerspectiveSensor,
@@ -24,6 +25,7 @@ pub struct Options {
     pub voxel_size: Option<f64>,
     pub integrator: Integrator,
     pub transmittance: TransmittanceEstimator,
+    pub roulette: Roulette,
     pub spp: Option<u32>,
     pub seed: Option<u64>,
     pub threads: Option<usize>,
@@ -38,6 +40,7 @@ pub fn options() -> Options {
         voxel_size: None,
         integrator: Integrator::Volpath,
         transmittance: TransmittanceEstimator::Analytic,
+        roulette: Roulette::Standard,
         spp: None,
         seed: None,
         threads: Some(2),
@@ -54,8 +57,8 @@ pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
         threads: o.threads,
         ..PrepareOptions::with_method(o.method)
     };
-    let Options { integrator, transmittance, spp, seed, threads, crop, segment_first, .. } = *o;
-    let options = RenderOptions { integrator, transmittance, spp, seed, threads, crop, segment_first };
+    let Options { integrator, transmittance, roulette, spp, seed, threads, crop, segment_first, .. } = *o;
+    let options = RenderOptions { integrator, transmittance, roulette, spp, seed, threads, crop, segment_first };
     PreparedScene::new(scene.clone(), &prepare, &Quiet)?.render(&options, &Quiet)
 }
 

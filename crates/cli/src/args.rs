@@ -76,6 +76,9 @@ pub(crate) struct RenderArgs {
     /// Transmittance towards emitters: exp(-tau), or the 0/1 estimate of other renderers, noisier and of the same mean
     #[arg(long, value_enum, default_value_t = TransmittanceName::Analytic)]
     pub(crate) transmittance: TransmittanceName,
+    /// When paths are ended by chance: as in Mitsuba 3, or earlier, as in the thesis's renderer; the mean is the same
+    #[arg(long, value_enum, default_value_t = RouletteName::Standard)]
+    pub(crate) roulette: RouletteName,
     /// Ask for a proof of each free flight before a ray is cast for it (volpath); the image is the same
     #[arg(long)]
     pub(crate) segment_first: bool,
@@ -136,6 +139,12 @@ impl From<GridName> for GridExtent {
             GridName::Scene => Self::Scene,
         }
     }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RouletteName {
+    Standard,
+    Thesis,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -8,12 +8,10 @@
 //! A is free and B is in the safe zones of *all* faces of A that look towards B; A itself is in safe(A) if it is free.
 //!
 //! *Which face.* The thesis takes the face through which the ray leaves A (4.2.2), and a ray through an edge could take
-//! either. A query here names voxels, and stands for all segments between their points. On each axis on which B differs
-//! from A some of these begin on the face towards B and leave through it at once; so each such face is a candidate, and
-//! only the smallest of their distances is safe. On an axis without difference no segment leaves. To know the face one
-//! needs the points: that would prove more, but it needs its own bound of rounding errors next to edges, it loses the
-//! free cuboid, on which the voxelization's promise rests, and safe neighbourhoods, which know voxels only, could not
-//! use it.
+//! either. Where only voxels are known, a query stands for all segments between their points. On each axis on which B
+//! differs from A some of these begin on the face towards B and leave through it at once; so each such face is a
+//! candidate, and only the smallest of their distances is safe ([`SafeZones::proves`], and so safe neighbourhoods). On an
+//! axis without difference no segment leaves. Where the points are known, one face is enough: see below.
 //!
 //! *Stored form.* dist^x+(V) = 1 + H^x+(V + e_x) with the distance to the *closed* half-space, H^x+(V) = min of
 //! d_Man(U, V) over the occupied U with U_x ≥ V_x. H is stored: it is 0 just for occupied voxels, it is a separable
@@ -24,11 +22,17 @@
 //! beyond a face of A that looks towards B; and d_Man(W, A) ≤ d_Man(B, A) < dist of that face. So W is free, and A is:
 //! the free cuboid property.
 //!
-//! *Cost.* 6·X·Y·Z bytes; up to four loads an end. The build is one Manhattan transform a face, each parallel over
+//! *By the ray's face* ([`Dsz::proves_leaving`]). Let the segment leave A through the face towards x+, say, and let
+//! d_Man(A, B) < dist^x+(A), A be free and B_x > A_x. Up to that face the segment is in A. From there on its x does not
+//! fall, so it is in voxels W of the cuboid of A and B with W_x > A_x; and d_Man(A, W) ≤ d_Man(A, B). So all voxels that
+//! it enters are free. The cuboid need not be. `VoxelGrid::leaves_through` finds the faces, and shows that rounding next
+//! to edges is within what the voxelization's dilation pays for the ends of segments anyway.
+//!
+//! *Cost.* 6·X·Y·Z bytes; up to four loads an end, and as many again and three divisions by the ray's face. The build is one Manhattan transform a face, each parallel over
 //! slices and columns.
 //!
 //! *Limits.* Nothing is proved over 256 voxels or more, in Manhattan distance: a diagonal is three times as long as for
-//! `amr`. Obstacles beside or behind, but beyond one of the faces, stop the proof.
+//! `amr`. Obstacles beside or behind, but beyond the face, stop the proof.
 
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
@@ -92,6 +96,47 @@ impl Dsz {
     #[inline]
     fn plane_value(&self, face: usize, index: usize) -> u8 {
         self.distances.get(face * self.resolution.voxel_count() + index).copied().unwrap_or(0)
+    }
+
+    /// True only if a segment from a point of `a` to one of `b` enters no occupied voxel that leaves `a` through the faces
+    /// that `from_a` names and, seen from its other end, `b` through those of `from_b` (4.2.2 in \[Houska2013\]). For each
+    /// axis they say whether it leaves through the face towards the other end; they are asked only if a face that is
+    /// left could prove it. False says nothing; what [`SafeZones::proves`] proves is not asked again.
+    #[inline]
+    pub fn proves_leaving(
+        &self,
+        a: Voxel,
+        b: Voxel,
+        from_a: impl FnOnce() -> [bool; 3],
+        from_b: impl FnOnce() -> [bool; 3],
+    ) -> bool {
+        let distance = manhattan_distance(a, b);
+        self.reaches_leaving(a, b, distance, from_a) || self.reaches_leaving(b, a, distance, from_b)
+    }
+
+    /// True if `b`, at `distance`, is in the safe zone of one of the faces of `a` that `leaves` names.
+    #[inline]
+    fn reaches_leaving(&self, a: Voxel, b: Voxel, distance: u32, leaves: impl FnOnce() -> [bool; 3]) -> bool {
+        let index = self.resolution.linear_index(a);
+        let row = self.resolution.x() as usize;
+        // As in `reaches`, but an axis on which they do not differ has no face that is left.
+        let safe = |axis: usize, from: u32, to: u32, stride: usize| {
+            if from < to {
+                distance <= u32::from(self.plane_value(2 * axis, index + stride))
+            } else {
+                from > to && distance <= u32::from(self.plane_value(2 * axis + 1, index - stride))
+            }
+        };
+        if self.plane_value(0, index) == 0 {
+            return false;
+        }
+        let x = safe(0, a.i, b.i, 1);
+        let y = safe(1, a.j, b.j, row);
+        let z = safe(2, a.k, b.k, row * self.resolution.y() as usize);
+        (x || y || z) && {
+            let [leaves_x, leaves_y, leaves_z] = leaves();
+            (x && leaves_x) || (y && leaves_y) || (z && leaves_z)
+        }
     }
 
     /// True if `b`, at `distance`, is in the safe zone of `a`.

@@ -4,7 +4,7 @@ mod common;
 
 use common::{cuboid_is_free, fields, random, scene, set};
 use proptest::prelude::*;
-use vdf_distfield::{Amr, Dsz, Dual, Ndf, Neighbourhood, SafeNeighbourhood, SafeZones};
+use vdf_distfield::{Amr, Dsz, Dual, Ndf, Neighbourhood, SafeNeighbourhood, SafeZones, VoxelBox};
 use vdf_voxel::{Resolution, Voxel, VoxelSet};
 
 const AXES: [usize; 3] = [0, 1, 2];
@@ -116,7 +116,9 @@ impl Definitions {
     /// Checks all pairs of a few voxels with all voxels: the definition of the safe zones, soundness and symmetry.
     fn check_proofs(&self, chosen: &[Voxel]) {
         let fields = fields(&self.occupied);
+        let dsz = Dsz::build(&self.occupied);
         for &a in chosen {
+            self.check_faces(&dsz, a);
             let near = fields.each_ref().map(|(_, field)| SafeNeighbourhood::new(&**field, &self.occupied, a));
             for near in &near {
                 assert_eq!(near.validate(&self.occupied), Ok(()));
@@ -136,6 +138,26 @@ impl Definitions {
                 assert!(proofs[1] || !proofs[0], "amr proves whatever ndf does: {a:?} {b:?}");
             }
             assert_eq!(counts, near.each_ref().map(|near| near.count()));
+        }
+    }
+
+    /// By the ray's face, from `a` to every voxel: Def. 12 for each face alone, and that no voxel beyond the face is occupied.
+    fn check_faces(&self, dsz: &Dsz, a: Voxel) {
+        let n = self.resolution.linear_index(a);
+        for b in self.resolution.voxels() {
+            let delta = AXES.map(|axis| array(b)[axis] - array(a)[axis]);
+            let manhattan: u32 = delta.iter().map(|c| c.unsigned_abs() as u32).sum();
+            for axis in AXES {
+                let face = 2 * axis + usize::from(delta[axis] < 0);
+                let expected = !self.occupied.contains(a) && delta[axis] != 0 && manhattan < self.dsz[n][face];
+                let (this, none) = (AXES.map(|other| other == axis), [false; 3]);
+                assert_eq!(dsz.proves_leaving(a, b, || this, || none), expected, "{a:?} {b:?} axis {axis}");
+                assert_eq!(dsz.proves_leaving(b, a, || none, || this), expected, "{b:?} {a:?} axis {axis}");
+                let beyond = |w: &Voxel| array(*w)[axis] != array(a)[axis];
+                let free = || VoxelBox::spanning(a, b).voxels().filter(beyond).all(|w| !self.occupied.contains(w));
+                assert!(!expected || free(), "unsound: {a:?} {b:?} axis {axis}");
+            }
+            assert!(!dsz.proves_leaving(a, b, || [false; 3], || [false; 3]), "no face is left");
         }
     }
 }

@@ -183,7 +183,11 @@ proptest! {
                 Span::Outside => true,
                 Span::Inside(u, v) => {
                     prop_assert!(grid.resolution().contains(u) && grid.resolution().contains(v));
-                    ndf.proves(u, v) || amr.proves(u, v) || dsz.proves(u, v) || dual.proves(u, v)
+                    let inside = grid.voxel_containing(a).is_some() && grid.voxel_containing(b).is_some();
+                    let leaves = || (grid.leaves_through(a, b), grid.leaves_through(b, a));
+                    let by_face = || dsz.proves_leaving(u, v, || leaves().0, || leaves().1);
+                    let by_cuboid = ndf.proves(u, v) || amr.proves(u, v) || dsz.proves(u, v) || dual.proves(u, v);
+                    by_cuboid || (inside && by_face())
                 }
             };
             if proved {

@@ -75,6 +75,8 @@ pub struct FilmOrigin {
     pub integrator: Integrator,
     /// Name of the estimator of transmittance.
     pub transmittance: &'static str,
+    /// Name of the roulette.
+    pub roulette: &'static str,
     /// Seed of the render.
     pub seed: u64,
     /// Width and height of the full film in pixels.
@@ -160,6 +162,7 @@ impl Film {
             ("the scene", a.scene != b.scene),
             ("the integrator", a.integrator != b.integrator),
             ("the estimator of transmittance", a.transmittance != b.transmittance),
+            ("the roulette", a.roulette != b.roulette),
             ("the seed", a.seed != b.seed),
             ("the size of the film", a.full_size != b.full_size),
             ("the crop", a.crop != b.crop),
@@ -228,8 +231,8 @@ mod tests {
 
     fn origin(seed: u64) -> FilmOrigin {
         let crop = PixelRect { x0: 0, y0: 0, x1: 3, y1: 1 };
-        let transmittance = "analytic";
-        FilmOrigin { scene: 1, integrator: Integrator::Volpath, transmittance, seed, full_size: [3, 1], crop }
+        let (transmittance, roulette) = ("analytic", "standard");
+        FilmOrigin { scene: 1, integrator: Integrator::Volpath, transmittance, roulette, seed, full_size: [3, 1], crop }
     }
 
     /// Values whose sums depend on the order: of very different sizes.

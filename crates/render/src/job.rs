@@ -113,6 +113,7 @@ impl<'a> Job<'a> {
                 visibility,
                 settings: scene.integrator,
                 transmittance: self.options.transmittance,
+                roulette: self.options.roulette,
                 progress,
             },
             camera: self.camera,

@@ -54,7 +54,7 @@ pub use integrator::{Integrator, UnknownIntegrator};
 pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};
 pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals, RegionSet};
-pub use options::{GridExtent, PrepareOptions, RenderOptions, TransmittanceEstimator, check_voxel_size};
+pub use options::{GridExtent, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator, check_voxel_size};
 pub use phase::PhaseFunction;
 pub use prepared::{PreparedScene, default_voxel_size};
 pub use progress::{Progress, Quiet};

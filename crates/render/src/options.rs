@@ -30,6 +30,28 @@ impl TransmittanceEstimator {
 /// Texels along each side of a face of a light buffer: at most so many.
 const MOST_TEXELS: u32 = 8192;
 
+/// When a path is ended by chance. All images have the same mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Roulette {
+    /// After more scattering events than the scene's `rr_depth`, as in Mitsuba 3; in bounded fog a path that is worth 1 always survives.
+    #[default]
+    Standard,
+    /// As in Mitsuba 0.4 to 0.6, the thesis's renderer: one event earlier, the boundary of a medium that is passed counts as an event, and
+    /// at most 95 % survive everywhere. Paths are shorter, so N is less: there to reproduce Table 6.11 in \[Houska2013\].
+    Thesis,
+}
+
+impl Roulette {
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Standard => "standard",
+            Self::Thesis => "thesis",
+        }
+    }
+}
+
 /// What a voxel grid covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GridExtent {
@@ -110,6 +132,8 @@ pub struct RenderOptions {
     pub integrator: Integrator,
     /// Estimator of transmittance towards emitters; by default analytic.
     pub transmittance: TransmittanceEstimator,
+    /// When paths are ended by chance.
+    pub roulette: Roulette,
     /// Samples per pixel; by default the scene's.
     pub spp: Option<u32>,
     /// Seed of the random numbers; by default the scene's.

@@ -112,6 +112,7 @@ pub(crate) fn render_film<'a>(
         scene: scene.checksum(),
         integrator: job.options().integrator,
         transmittance: job.options().transmittance.name(),
+        roulette: job.options().roulette.name(),
         seed: job.seed(),
         full_size: [scene.film.width, scene.film.height],
         crop,

@@ -34,6 +34,8 @@ pub struct Statistics {
     pub samples_per_segment: Option<u32>,
     /// Estimator of transmittance towards emitters.
     pub transmittance: &'static str,
+    /// When paths were ended by chance.
+    pub roulette: &'static str,
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
     /// Samples per pixel.
@@ -143,6 +145,7 @@ impl Statistics {
             integrator: options.integrator.name(),
             samples_per_segment: options.integrator.samples_per_segment(),
             transmittance: options.transmittance.name(),
+            roulette: options.roulette.name(),
             size: job.size(),
             spp: job.spp(),
             seed: job.seed(),

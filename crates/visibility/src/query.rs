@@ -31,6 +31,10 @@ pub enum QueryKind {
 
 /// Hears every query that is asked, with its answer.
 pub trait Recorder {
+    /// A query is about to be asked.
+    #[inline(always)]
+    fn begins(&self) {}
+
     /// `query` was asked, and this was the answer.
     fn record(&self, query: &ShadowQuery, unoccluded: bool);
 }
@@ -103,6 +107,7 @@ impl<R: Recorder> Visibility<'_, R> {
     /// Whether the closed segment of the query meets no occluder.
     #[inline]
     pub fn unoccluded(&self, query: &ShadowQuery, counters: &mut Counters) -> bool {
+        self.recorder.begins();
         let unoccluded = self.ask(query, counters);
         self.recorder.record(query, unoccluded);
         unoccluded

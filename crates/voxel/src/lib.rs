@@ -15,6 +15,7 @@ mod clip;
 mod error;
 mod export;
 mod grid;
+mod leaving;
 mod set;
 mod validate;
 mod voxelize;

@@ -164,16 +164,18 @@ pub(crate) struct ReportScalingArgs {
 #[derive(Debug, Args)]
 #[command(
     about = about("thesis"),
-    after_help = "Tables 6.1, 6.2, 6.4 to 6.11 and Figure 6.7, for all methods, and the inequality 2.7: the gain that it
+    after_help = "Tables 6.1 to 6.11 and Figure 6.7, for all methods, and the inequality 2.7: the gain that it
 predicts and the gain measured. Images are compared bit by bit between all methods. The times of renders are
 for one thread, as in the thesis, and for all, and scaled to its images of 512 x 512 pixels if these are smaller.
 
-At full size this takes most of a day; --size 128 a sixteenth of that, --quick a minute.
+At full size this takes most of a day; --size 128 a sixteenth of that, --quick a minute. With --resume each
+figure is kept as soon as it is measured: the same command goes on where it was stopped.
 
 Examples:
   vdf report thesis --quick                                     a look
   vdf report thesis --size 128 --html thesis.html --csv thesis.csv
   vdf report thesis --scenes scape --methods amr,amr-xsn        part of it
+  vdf report thesis --threads 1 --resume cells --html thesis.html    all of it, in as many runs as it takes
 
 Exit codes: 0 done, 1 an answer or image is wrong or a file cannot be written, 2 usage error, 130 interrupted."
 )]
@@ -197,6 +199,10 @@ pub(crate) struct ReportThesisArgs {
     /// Number of all threads, whose renders stand beside those on one thread [default: one for each processor]
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<usize>,
+    /// Keep each figure in this folder as soon as it is measured, and take from it what a stopped run with the same
+    /// options has measured
+    #[arg(long, value_name = "DIR")]
+    pub(crate) resume: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) files: ReportFiles,
 }

@@ -13,14 +13,14 @@ use vdf_image::{
 };
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Statistics, TransmittanceEstimator,
+    Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Roulette, Statistics, TransmittanceEstimator,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
 use vdf_visibility::Method;
 
 use crate::{
-    args::{RenderArgs, TransmittanceName},
+    args::{RenderArgs, RouletteName, TransmittanceName},
     failure::{Failure, say},
     progress::Reporter,
 };
@@ -111,6 +111,10 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         transmittance: match args.transmittance {
             TransmittanceName::Analytic => TransmittanceEstimator::Analytic,
             TransmittanceName::Analog => TransmittanceEstimator::Analog,
+        },
+        roulette: match args.roulette {
+            RouletteName::Standard => Roulette::Standard,
+            RouletteName::Thesis => Roulette::Thesis,
         },
         spp: args.spp,
         seed: args.seed,
@@ -235,6 +239,7 @@ fn attributes(s: &Statistics, name: &str, scene: &Scene) -> Vec<(&'static str, A
         ("vdf.method", s.method.into()),
         ("vdf.integrator", s.integrator.into()),
         ("vdf.transmittance", s.transmittance.into()),
+        ("vdf.roulette", s.roulette.into()),
         ("vdf.samplesPerPixel", i64::from(s.spp).into()),
         ("vdf.seed", s.seed.to_string().into()),
         ("vdf.queries", count(s.queries)),

@@ -128,6 +128,7 @@ fn run_thesis(args: &ReportThesisArgs) -> Result<(), Failure> {
         size: args.size.unwrap_or(standard.size),
         seed: args.seed,
         threads: args.threads,
+        resume: args.resume.clone(),
         ..standard
     };
     options.validate()?;

@@ -65,8 +65,9 @@ fn method_by_default() {
 #[test]
 fn flights_are_asked_for_on_demand() {
     let sandbox = Sandbox::new();
+    // Here the camera is in the fog.
     let flights = |option: &[&str]| {
-        sandbox.render(&[&["--stats", "fog.json"], option].concat());
+        sandbox.render(&[&["cbox_light", "--stats", "fog.json"], option].concat());
         let json: serde_json::Value = serde_json::from_slice(&sandbox.read("fog.json")).unwrap();
         json["flights"].as_u64().unwrap()
     };

@@ -132,9 +132,15 @@ fn the_thesis_in_miniature() {
         ["report", "thesis", "--quick", "--size", "4", "--scenes", "cbox_vol2,cbox_vol6", "--methods", "amr-sn,ndf"];
     let files = ["--html", "t.html", "--csv", "t.csv", "--json", "t.json", "-q", "--threads", "3"];
     let text = sandbox.run(&[&args[..], &files].concat()).succeeded().stdout;
-    for heading in
-        ["Table 6.1:", "Table 6.2:", "Table 6.4", "Tables 6.5 to 6.10: cbox_vol6", "Table 6.11", "Inequality 2.7"]
-    {
+    for heading in [
+        "Table 6.1:",
+        "Table 6.2:",
+        "Table 6.3",
+        "Table 6.4",
+        "Tables 6.5 to 6.10: cbox_vol6",
+        "Table 6.11",
+        "Inequality 2.7",
+    ] {
         assert!(text.contains(heading), "no {heading} in {text}");
     }
     // Facts of the thesis in their places.
@@ -149,14 +155,58 @@ fn the_thesis_in_miniature() {
     let figures = report["figures"].as_array().unwrap();
     // Two methods and the hierarchy, four settings.
     let count = |table: &str| figures.iter().filter(|f| f["table"] == table).count();
-    assert_eq!(count("6.11"), 8);
+    assert_eq!(count("6.11"), 12);
     assert_eq!(count("6.4"), 1 + 2 * 3);
     // Times of renders and of builds on three threads too.
-    assert_eq!(count("6.5-6.10"), 4 * (3 + 1 + 2 * (4 + 2)));
-    assert_eq!(count("2.7"), 4 * 2 * (4 + 1));
+    assert_eq!(count("6.5-6.10"), 4 * (4 + 1 + 2 * (5 + 2)));
+    assert_eq!(count("2.7"), 4 * (1 + 2 * (4 + 1)));
     assert_eq!(figures.iter().filter(|f| f["against"] == 3.0).count(), 4 * (1 + 2 * 3));
-    assert_eq!((count("6.1"), count("6.2")), (3, 7));
+    assert_eq!((count("6.1"), count("6.2"), count("6.3")), (3, 10, 6));
     assert!(figures.iter().all(|f| f["value"].is_f64()), "a figure is not finite");
+}
+
+/// A second run takes what the first has measured, all but the cells that are missing or damaged; other options share nothing with it.
+#[test]
+fn the_thesis_goes_on_where_it_was_stopped() {
+    let sandbox = Sandbox::new();
+    let figures = |seed: &str, name: &str| {
+        let args =
+            ["report", "thesis", "--quick", "--size", "4", "--scenes", "cbox_vol2,cbox_vol6", "--methods", "ndf"];
+        let rest = ["--threads", "1", "--resume", "cells", "--seed", seed, "--json", name, "-q"];
+        sandbox.run(&[&args[..], &rest].concat()).succeeded();
+        json(&sandbox, name)["figures"].as_array().unwrap().clone()
+    };
+    let first = figures("0", "a.json");
+    let cells = || {
+        let entries = std::fs::read_dir(sandbox.path().join("cells")).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    };
+    let kept = cells();
+    // Tables 6.1 to 6.3; for each integrator the hierarchy, its image, its turn, and a method.
+    assert_eq!(kept.len(), 3 + 4 * 4, "{kept:?}");
+    assert_eq!(figures("0", "b.json"), first, "times, too, come from the cells");
+    assert_eq!(cells(), kept);
+
+    let path = |end: &str| {
+        let name = kept.iter().find(|name| name.ends_with(end)).unwrap();
+        sandbox.path().join("cells").join(name)
+    };
+    std::fs::remove_file(path("-volpath-ndf-8.json")).unwrap();
+    let damaged = path("-raymarch-7-ndf-8.json");
+    let text = std::fs::read_to_string(&damaged).unwrap();
+    std::fs::write(&damaged, &text[..text.len() / 2]).unwrap();
+    let again = figures("0", "c.json");
+    assert_eq!(cells(), kept);
+    assert_ne!(again, first, "no two measurements are the same");
+    let measured_again =
+        |f: &serde_json::Value| f["method"] == "ndf" && ["volpath", "raymarch 7"].iter().any(|i| f["integrator"] == *i);
+    for (a, b) in again.iter().zip(&first).filter(|(a, _)| !measured_again(a)) {
+        assert_eq!(a, b);
+    }
+    let n = |figures: &[serde_json::Value]| figures.iter().find(|f| f["quantity"] == "N").unwrap()["value"].clone();
+    assert_ne!(n(&figures("1", "d.json")), n(&first), "another seed is another run");
 }
 
 #[test]

@@ -11,7 +11,7 @@ fn figures_only() {
     let sandbox = Sandbox::new();
     let out = sandbox.run(&["voxelize", "--voxel", "8", "--grid", "scene"]).succeeded().stdout;
     assert!(
-        out.starts_with("grid           77 x 73 x 169 voxels of 8\norigin         -26 -16 -790\noccupied "),
+        out.starts_with("grid           77 x 73 x 169 voxels of 8\norigin         -32 -16 -789\noccupied "),
         "{out}"
     );
     assert!(out.contains(" of 949949, ") && out.contains("emitter 0      neighbourhood of "), "{out}");
@@ -43,7 +43,7 @@ fn exported_files() {
         let (list, surface) = (read("txt"), read("obj"));
         let header: Vec<_> = list.lines().take(2).collect();
         assert_eq!(header, [format!("# {count} of 16340 voxels").as_str(), "# resolution 20 19 43"], "{name}");
-        assert!(list.contains("# origin -26 -16 -790\n# voxel size 32\n# linear index = a + b*X + c*X*Y\n"));
+        assert!(list.contains("# origin -32 -16 -789\n# voxel size 32\n# linear index = a + b*X + c*X*Y\n"));
         assert_eq!(list.lines().filter(|l| !l.starts_with('#')).count(), count);
         assert!(count > 0 && lines(&surface, "v ").count() > 7 && lines(&surface, "f ").count() > 5, "{name}");
     }

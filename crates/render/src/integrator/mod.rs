@@ -11,7 +11,7 @@ use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
 pub use self::kind::{Integrator, UnknownIntegrator};
 use crate::{
-    PhaseFunction as _, Progress, RegionSet, Sampler, TransmittanceEstimator,
+    PhaseFunction as _, Progress, RegionSet, Roulette, Sampler, TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
     world::{SurfacePoint, World},
 };
@@ -22,6 +22,7 @@ pub(crate) struct Tracer<'a, R> {
     pub(crate) visibility: Visibility<'a, R>,
     pub(crate) settings: IntegratorSettings,
     pub(crate) transmittance: TransmittanceEstimator,
+    pub(crate) roulette: Roulette,
     /// Whom a long path asks whether to stop.
     pub(crate) progress: &'a dyn Progress,
 }
@@ -60,6 +61,8 @@ struct Path {
     on_surface: bool,
     /// Scattering events so far; passing a medium boundary is none.
     depth: u32,
+    /// Rays that ended in other regions than they began in; counted for [`Roulette::Thesis`] only.
+    crossings: u32,
     /// What light that arrives along the ray is worth at the camera.
     throughput: Rgb,
     /// Light gathered so far.
@@ -68,7 +71,15 @@ struct Path {
 
 impl Path {
     fn new(ray: PathRay) -> Self {
-        Self { ray, origin: Origin::Camera, on_surface: false, depth: 0, throughput: Rgb::ONE, radiance: Rgb::ZERO }
+        Self {
+            ray,
+            origin: Origin::Camera,
+            on_surface: false,
+            depth: 0,
+            crossings: 0,
+            throughput: Rgb::ONE,
+            radiance: Rgb::ZERO,
+        }
     }
 }
 
@@ -120,8 +131,16 @@ impl<R: Recorder> Tracer<'_, R> {
     fn goes_on(&self, path: &mut Path, sampler: &mut Sampler) -> bool {
         self.may_scatter(path.depth)
             && path.throughput != Rgb::ZERO
-            && survives(path, self.settings.rr_depth, sampler)
+            && survives(path, self.roulette, self.settings.rr_depth, sampler)
             && !self.stops_at(path.depth)
+    }
+
+    /// The path's ray ends in these regions.
+    #[inline]
+    fn crosses_to(&self, path: &mut Path, end: &RegionSet) {
+        if self.roulette == Roulette::Thesis && path.ray.regions != *end {
+            path.crossings += 1;
+        }
     }
 
     /// Whether to stop, asked once in many events.
@@ -323,12 +342,16 @@ const MANY_EVENTS: u32 = 1 << 16;
 /// *Departure from Mitsuba 3*, where that is at most 0.95 everywhere: in dense white fog, where a path loses nothing in thousands of
 /// collisions, that would kill it where it is worth 1, and what survives would be worth 0.95⁻ⁿ: infinite variance, and a furnace that looks
 /// too dark. A path in bounded fog leaves it, so there the bound is not needed; between white walls, and in fog without an end, it is.
+/// [`Roulette::Thesis`] has the bound, begins one event earlier, and counts crossings as events.
 #[inline]
-fn survives(path: &mut Path, rr_depth: u32, sampler: &mut Sampler) -> bool {
-    if path.depth <= rr_depth {
+fn survives(path: &mut Path, roulette: Roulette, rr_depth: u32, sampler: &mut Sampler) -> bool {
+    let thesis = roulette == Roulette::Thesis;
+    let spared =
+        if thesis { path.depth == 0 || path.depth + path.crossings < rr_depth } else { path.depth <= rr_depth };
+    if spared {
         return true;
     }
-    let endless = path.on_surface || path.depth > MANY_EVENTS || path.ray.regions.is_empty();
+    let endless = thesis || path.on_surface || path.depth > MANY_EVENTS || path.ray.regions.is_empty();
     let q = path.throughput.max_element().min(if endless { MAX_SURVIVAL } else { 1.0 });
     if sampler.next_1d() >= f64::from(q) {
         return false;

@@ -31,6 +31,7 @@ impl<R: Recorder> Tracer<'_, R> {
                 path.radiance += path.throughput * light;
             }
             path.throughput *= to_f32((-tau).exp());
+            self.crosses_to(&mut path, intervals.end());
             if !self.arrive(&mut path, surface, intervals.end().clone(), sampler, counters) {
                 break;
             }

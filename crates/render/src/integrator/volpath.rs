@@ -72,6 +72,7 @@ impl<R: Recorder> Tracer<'_, R> {
                     let surface = self.world.surface_point(&hit, ray.direction);
                     // The way to the surface is a part of the flight, but where a ray starts from a surface is beside that.
                     let regions = media.at_end(&Segment::new(flight.p, surface.point), &ray.regions);
+                    self.crosses_to(path, &regions);
                     Event::Arrival { surface: Some(surface), regions }
                 }
             };
@@ -83,8 +84,14 @@ impl<R: Recorder> Tracer<'_, R> {
             return Event::Arrival { surface: None, regions: RegionSet::default() };
         }
         match media.free_flight(&free, &ray.regions, tau) {
-            FreeFlight::Collision { t, medium, regions } => Event::Collision { point: free.at(t), medium, regions },
-            FreeFlight::Passed(regions) => Event::Arrival { surface, regions },
+            FreeFlight::Collision { t, medium, regions } => {
+                self.crosses_to(path, &regions);
+                Event::Collision { point: free.at(t), medium, regions }
+            }
+            FreeFlight::Passed(regions) => {
+                self.crosses_to(path, &regions);
+                Event::Arrival { surface, regions }
+            }
         }
     }
 }

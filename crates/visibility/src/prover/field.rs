@@ -1,8 +1,10 @@
 //! The distance field: proofs about any two points.
 //!
-//! *Idea.* If the voxel of one end lies in the safe zone of the other's, the cuboid between them is free (3.3 in \[Houska2013\]).
+//! *Idea.* If the voxel of one end lies in the safe zone of the other's, the cuboid between them is free (3.3 in \[Houska2013\]), or at
+//! least the part of it that the segment can enter.
 //!
-//! *Definition.* Those of the fields: Def. 8 to 13, in `vdf-distfield`. A segment is clipped to the grid first, outside of which there is
+//! *Definition.* Those of the fields: Def. 8 to 13, in `vdf-distfield`; for `dsz` also by the face through which the
+//! segment leaves the voxel of its end, if both ends are in the grid (4.2.2). A segment is clipped to the grid first, outside of which there is
 //! nothing.
 //!
 //! *Guarantee.* "Unoccluded" only if no occluder meets the closed segment, exactly: the field's voxels are those of a conservative
@@ -95,9 +97,18 @@ impl FieldProver {
     #[must_use]
     pub fn answer(&self, a: DVec3, b: DVec3) -> Answer {
         Answer::unoccluded_if(match self.grid.voxel_span(a, b) {
-            Span::Inside(a, b) => each_field!(&self.field, f => f.proves(a, b)),
+            Span::Inside(u, v) => each_field!(&self.field, f => f.proves(u, v)) || self.proves_by_face(a, b),
             // The grid covers all occluders.
             Span::Outside => true,
         })
+    }
+
+    /// Whether `dsz` proves the segment by the faces through which it leaves the voxels of its ends.
+    #[inline]
+    fn proves_by_face(&self, a: DVec3, b: DVec3) -> bool {
+        let DistanceField::Dsz(field) = &self.field else { return false };
+        // Where a segment from outside enters is known by rounding outwards: good for a cuboid, not for a face.
+        let (Some(u), Some(v)) = (self.grid.voxel_containing(a), self.grid.voxel_containing(b)) else { return false };
+        field.proves_leaving(u, v, || self.grid.leaves_through(a, b), || self.grid.leaves_through(b, a))
     }
 }

@@ -1,7 +1,9 @@
 //! How it is measured: scenes, builds, renders and replays as the thesis's tables want them.
 
 use vdf_image::Image;
-use vdf_render::{GridExtent, Integrator, PrepareOptions, PreparedScene, Progress, RenderOptions, Statistics};
+use vdf_render::{
+    GridExtent, Integrator, PrepareOptions, PreparedScene, Progress, RenderOptions, Roulette, Statistics,
+};
 use vdf_scene::{LoadOptions, Scene};
 use vdf_scenes::builtin;
 use vdf_visibility::Method;
@@ -9,6 +11,7 @@ use vdf_visibility::Method;
 use super::{
     super::bench::{median, same_bits},
     SIDE,
+    store::Store,
 };
 use crate::{
     LabError,
@@ -16,7 +19,7 @@ use crate::{
     queries::{QueryStream, Replay, ReplayOptions, record_queries, replay},
 };
 
-/// A render that takes less is repeated, up to five times, and the median taken. In seconds.
+/// Renders that together take less are repeated, up to five times, and the median taken; two there are always, for the spread. In seconds.
 const SHORT: f64 = 0.2;
 
 /// The thesis's grids cover the whole scene (5.2).
@@ -32,7 +35,12 @@ pub(super) struct Bench<'a> {
     pub(super) seed: u64,
     /// Threads of the renders beside those on one thread; 1 if there are none.
     pub(super) threads: usize,
+    /// What was measured by an earlier run.
+    pub(super) store: Store,
 }
+
+/// Statistics of the render of median time, and how far the times are apart: (greatest − least) / median.
+pub(super) type Spread<T> = (T, f64);
 
 impl Bench<'_> {
     /// By how much the thesis's images are larger.
@@ -69,6 +77,7 @@ impl Bench<'_> {
             spp: Some(spp),
             seed: Some(self.seed),
             threads: Some(1),
+            roulette: Roulette::Thesis,
             segment_first: false,
             ..RenderOptions::default()
         }
@@ -88,19 +97,19 @@ impl Bench<'_> {
         Ok(alone.with_options(&options, &Part(self.progress))?)
     }
 
-    /// One render, or the one of median time of several short ones.
+    /// Two renders or more: the image, and the statistics with the median of the times.
     pub(super) fn render(
         &self,
         prepared: &PreparedScene,
         options: &RenderOptions,
-    ) -> Result<(Image, Statistics), LabError> {
+    ) -> Result<(Image, Spread<Statistics>), LabError> {
         let mut times = Vec::new();
         loop {
             let rendering = prepared.render(options, &Part(self.progress))?;
             times.push(rendering.statistics.t_render);
-            if times.len() == 5 || times.iter().sum::<f64>() >= SHORT {
+            if times.len() == 5 || (times.len() >= 2 && times.iter().sum::<f64>() >= SHORT) {
                 let statistics = Statistics { t_render: median(&times), ..rendering.statistics };
-                return Ok((rendering.image, statistics));
+                return Ok((rendering.image, (statistics, spread(&times))));
             }
         }
     }
@@ -111,10 +120,10 @@ impl Bench<'_> {
         prepared: &PreparedScene,
         options: &RenderOptions,
         expected: &Image,
-    ) -> Result<Statistics, LabError> {
-        let (image, statistics) = self.render(prepared, options)?;
+    ) -> Result<Spread<Statistics>, LabError> {
+        let (image, (statistics, spread)) = self.render(prepared, options)?;
         if same_bits(&image, expected) {
-            return Ok(statistics);
+            return Ok((statistics, spread));
         }
         let Statistics { method, threads, .. } = statistics;
         let size = statistics.voxel_size.unwrap_or_default();
@@ -155,8 +164,13 @@ impl Bench<'_> {
     }
 }
 
-/// `T_query` in seconds of `n` queries, of which the spatial ones take `t_spatial` ns and the others what they took in
-/// the replay.
-pub(super) fn total(n: f64, p_sp: f64, replay: &Replay, t_spatial: f64) -> f64 {
-    1e-9 * n * (p_sp * t_spatial + (1.0 - p_sp) * replay.hierarchy.t_other())
+/// `T_query` in seconds of `n` queries, of which the spatial ones take `t_spatial` ns and the others `t_other`, as in the replay.
+pub(super) fn total(n: f64, p_sp: f64, t_spatial: f64, t_other: f64) -> f64 {
+    1e-9 * n * (p_sp * t_spatial + (1.0 - p_sp) * t_other)
+}
+
+/// (greatest − least) / median; 0 of one value.
+pub(super) fn spread(values: &[f64]) -> f64 {
+    let (least, greatest) = values.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), &v| (l.min(v), g.max(v)));
+    if values.len() < 2 { 0.0 } else { (greatest - least) / median(values) }
 }

@@ -13,6 +13,7 @@ pub(super) struct ThesisData {
     pub(super) proof_times: Vec<ProofTime>,
     pub(super) repeated: Vec<Repeated>,
     pub(super) measured: Vec<Measured>,
+    pub(super) overheads: Vec<Overhead>,
 }
 
 /// A row of Tables 6.5 to 6.10. Times in seconds, shares in per cent.
@@ -72,6 +73,17 @@ pub(super) struct Measured {
     #[serde(rename = "samples_per_segment", deserialize_with = "integrator")]
     pub(super) integrator: Integrator,
     pub(super) samples_per_pixel: u32,
+    pub(super) t_build_with: f64,
+    pub(super) t_render_with: f64,
+    pub(super) t_query: f64,
+    pub(super) t_build_without: f64,
+    pub(super) t_render_without: f64,
+}
+
+/// A row of Table 6.3, in seconds: the ray marcher with 49 samples, without acceleration, with a timer in the loop and without.
+#[derive(Clone, Debug, Deserialize)]
+pub(super) struct Overhead {
+    pub(super) scene: String,
     pub(super) t_render_with: f64,
     pub(super) t_query: f64,
     pub(super) t_render_without: f64,
@@ -85,6 +97,7 @@ impl ThesisData {
             proof_times: rows(include_str!("../../../data/thesis/proof_times.csv"))?,
             repeated: rows(include_str!("../../../data/thesis/repeated.csv"))?,
             measured: rows(include_str!("../../../data/thesis/measured.csv"))?,
+            overheads: rows(include_str!("../../../data/thesis/overhead.csv"))?,
         })
     }
 
@@ -112,6 +125,10 @@ impl ThesisData {
         self.proof_times
             .iter()
             .find(|r| r.scene == scene && r.method == method && (method == "none" || r.voxel_size == size))
+    }
+
+    pub(super) fn overhead(&self, scene: &str) -> Option<&Overhead> {
+        self.overheads.iter().find(|r| r.scene == scene)
     }
 
     /// The first run of each setting of Table 6.1.
@@ -182,6 +199,18 @@ mod tests {
         assert_eq!(thesis.proof_time("cbox_vol6", "amr-sn", 8.0).unwrap().t_acc, 14.0);
         assert_eq!(thesis.queries("scape", Integrator::raymarch(49)).unwrap().n, 58_220_000.0);
         assert_eq!(thesis.acceleration("san-miguel", "amr", 0.5, Integrator::Volpath).unwrap().p_acc_sp, Some(9.46));
+        // 6.3.1: T_query less half of the overhead, over N, is t_query of Table 6.4 but for rounding.
+        for scene in SCENES.map(|s| s.name) {
+            let (t, many) = (thesis.overhead(scene).unwrap(), Integrator::raymarch(49));
+            let none = thesis.acceleration(scene, "none", 0.0, many).unwrap();
+            assert_eq!((t.t_render_with, t.t_query), (none.t_render, none.t_query));
+            let real = t.t_query - 0.5 * (t.t_render_with - t.t_render_without);
+            let each = 1e9 * real / thesis.queries(scene, many).unwrap().n;
+            assert!(
+                (each / thesis.proof_time(scene, "none", 0.0).unwrap().t_acc - 1.0).abs() < 0.01,
+                "{scene}: {each}"
+            );
+        }
         assert_eq!((thesis.repeated.len(), thesis.repeated_settings().len(), thesis.measured.len()), (24, 3, 3));
     }
 }

@@ -15,15 +15,21 @@ mod query_tables;
 mod repeated;
 mod repeated_tables;
 mod scenes;
+mod store;
+mod timed;
+
+use std::path::PathBuf;
 
 use vdf_render::{Integrator, Progress};
+use vdf_scenes::builtin;
 use vdf_visibility::Method;
 
 use self::{
     bench::Bench,
     data::ThesisData,
-    repeated::{MeasuredResult, RepeatedResult},
+    repeated::{MeasuredResult, OverheadCell, RepeatedResult},
     scenes::SceneResult,
+    store::Store,
 };
 use super::{
     MAX_THREADS, Report,
@@ -56,6 +62,9 @@ const SCENES: [ThesisScene; 4] = [
 const INTEGRATORS: [Integrator; 4] =
     [Integrator::raymarch(1), Integrator::raymarch(7), Integrator::raymarch(49), Integrator::Volpath];
 
+/// The integrator of Tables 6.3 and 6.4.
+const MANY: Integrator = Integrator::raymarch(49);
+
 /// Samples per pixel in these tables.
 const SPP: u32 = 4;
 
@@ -74,6 +83,8 @@ pub struct ThesisOptions {
     pub seed: u64,
     /// Number of all threads, whose renders stand beside those on one thread; by default one for each processor.
     pub threads: Option<usize>,
+    /// Folder in which each figure is kept as soon as it is measured, and from which those are taken that are there.
+    pub resume: Option<PathBuf>,
 }
 
 impl Default for ThesisOptions {
@@ -86,6 +97,7 @@ impl Default for ThesisOptions {
             size: SIDE,
             seed: 0,
             threads: None,
+            resume: None,
         }
     }
 }
@@ -126,28 +138,54 @@ impl ThesisOptions {
 /// Measures the tables of the scenes that the options name.
 ///
 /// # Errors
-/// If an option is not usable, an answer or image is wrong, or `progress` asks to stop.
+/// If an option is not usable, an answer or image is wrong, the folder of [`ThesisOptions::resume`] cannot be written, or `progress` asks to
+/// stop. What was measured until then is in that folder.
 pub fn run(options: &ThesisOptions, progress: &dyn Progress) -> Result<Report, LabError> {
     options.validate()?;
     let thesis = ThesisData::load()?;
     let ThesisOptions { quick, size: side, seed, .. } = *options;
     let methods = proving(&options.methods);
-    let bench = Bench { progress, methods: &methods, side, quick, seed, threads: options.threads() };
+    let store = Store::new(options.resume.as_deref(), dependencies(options, &methods))?;
+    let bench = Bench { progress, methods: &methods, side, quick, seed, threads: options.threads(), store };
     let named = |name: &str| options.scenes.iter().any(|s| s == name);
     let scenes: Vec<ThesisScene> = SCENES.into_iter().filter(|s| named(s.name)).collect();
     let repeated: Vec<_> = thesis.repeated_settings().into_iter().filter(|s| named(&s.scene)).collect();
     let measured: Vec<_> = thesis.measured.iter().filter(|m| named(&m.scene)).collect();
-    let steps = bench.scene_steps(scenes.len()) + bench.repeated_steps(repeated.len(), measured.len());
+    let steps = bench.scene_steps(scenes.len()) + bench.repeated_steps(repeated.len(), measured.len(), scenes.len());
     progress.work_total(steps as u64);
 
+    let overheads =
+        scenes.iter().map(|s| Ok((s.name, bench.overhead(s.name)?))).collect::<Result<Vec<_>, LabError>>()?;
     let scenes = scenes.iter().map(|s| bench.scene(s)).collect::<Result<Vec<_>, LabError>>()?;
     let repeated = repeated.into_iter().map(|s| bench.repeated(s)).collect::<Result<Vec<_>, LabError>>()?;
     let measured = measured.into_iter().map(|m| bench.measured(m)).collect::<Result<Vec<_>, LabError>>()?;
-    let tables =
-        Tables { thesis: &thesis, threads: bench.threads, scenes: &scenes, repeated: &repeated, measured: &measured };
+    let tables = Tables {
+        thesis: &thesis,
+        threads: bench.threads,
+        scenes: &scenes,
+        repeated: &repeated,
+        measured: &measured,
+        overheads: &overheads,
+    };
     let (sections, figures) = tables.all();
     let page = Page { title: "Chapter 6 of the thesis, measured again".to_owned(), lead: lead(&bench), sections };
     Ok(Report::new(page, figures, seed))
+}
+
+/// What the figures of a run depend on, beside the scenes of Tables 6.4 to 6.11, whose cells name their checksums.
+fn dependencies(options: &ThesisOptions, methods: &[Method]) -> String {
+    let ThesisOptions { quick, size, seed, .. } = options;
+    let methods: Vec<_> = methods.iter().map(|m| m.name()).collect();
+    // Generated scenes change with the program only.
+    let boxes = ThesisOptions::SCENES.iter().filter(|name| name.starts_with("cbox")).filter_map(|name| builtin(name));
+    let texts: String =
+        boxes.flat_map(|source| source.files().iter().map(|f| f.text.to_string()).collect::<Vec<_>>()).collect();
+    format!(
+        "size {size}, seed {seed}, quick {quick}, {} threads, methods {}, boxes {:08x}",
+        options.threads(),
+        methods.join(","),
+        crc32fast::hash(texts.as_bytes())
+    )
 }
 
 fn lead(bench: &Bench<'_>) -> Vec<String> {
@@ -166,8 +204,8 @@ fn lead(bench: &Bench<'_>) -> Vec<String> {
              i7-3632QM in Mitsuba 0.x then, one thread of the machine named below now, unless a column says otherwise.{small}"
         ),
         "All images were compared bit by bit with those of the hierarchy alone, and every replayed answer with the hierarchy's; all \
-         agree. The geometry of san-miguel and scape is generated, not the thesis's; the places of lights and media are not printed \
-         there."
+         agree. The geometry of san-miguel and scape is generated, not the thesis's. Where the boxes' light and fog are is not printed there: \
+         they were fitted to its tables."
             .to_owned(),
     ]
 }
@@ -180,6 +218,7 @@ struct Tables<'a> {
     scenes: &'a [SceneResult],
     repeated: &'a [RepeatedResult<'a>],
     measured: &'a [MeasuredResult<'a>],
+    overheads: &'a [(&'static str, OverheadCell)],
 }
 
 impl Tables<'_> {
@@ -193,6 +232,7 @@ impl Tables<'_> {
                 ..Section::default()
             });
             sections.push(self.queries(&mut figures));
+            sections.push(self.overhead(&mut figures));
             sections.push(self.proof_times(&mut figures));
             sections.extend(self.scenes.iter().map(|s| self.acceleration(s, &mut figures)));
             sections.push(self.inequality(&mut figures));
