@@ -252,7 +252,7 @@ fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[Ligh
         match built {
             Ok(buffer) => {
                 free -= buffer.bytes() as u64;
-                kept.prover = Some(LightProver::Buffer(buffer));
+                kept.prover = Some(LightProver::Buffer(Box::new(buffer)));
             }
             Err(refusal) => kept.fallback = Some(refusal.reason()),
         }

@@ -44,7 +44,7 @@ pub enum LightProver {
     /// The neighbourhood of an area light's voxel box (4.4.1).
     Area(AreaNeighbourhood),
     /// The light buffer of a point light.
-    Buffer(LightBuffer),
+    Buffer(Box<LightBuffer>),
 }
 
 impl LightProver {

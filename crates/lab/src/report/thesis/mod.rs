@@ -92,7 +92,7 @@ impl Default for ThesisOptions {
     fn default() -> Self {
         Self {
             scenes: Self::SCENES.map(str::to_owned).to_vec(),
-            methods: Method::proving().collect(),
+            methods: Method::with_voxels().collect(),
             quick: false,
             size: SIDE,
             seed: 0,

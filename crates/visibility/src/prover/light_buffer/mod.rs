@@ -99,7 +99,8 @@ struct Tag(u32);
 
 impl Tag {
     /// There must not be more triangles, entries or texels.
-    const MOST: usize = (1 << 30) - 1;
+    const MOST: usize = Self::NUMBER as usize;
+    const NUMBER: u32 = (1 << 30) - 1;
     const LIST: u32 = 0;
     const SINGLE: u32 = 1;
 
@@ -110,12 +111,12 @@ impl Tag {
 
     /// One triangle.
     const fn single(number: u32) -> Self {
-        Self(1 << 30 | number)
+        Self((Self::SINGLE << 30) | number)
     }
 
     /// The parts that start at this texel.
     const fn parts(first: usize) -> Self {
-        Self(2 << 30 | first as u32)
+        Self((2 << 30) | first as u32)
     }
 
     #[inline]
@@ -125,7 +126,7 @@ impl Tag {
 
     #[inline]
     const fn number(self) -> usize {
-        (self.0 & (1 << 30) - 1) as usize
+        (self.0 & Self::NUMBER) as usize
     }
 
     fn as_single(self) -> Option<u32> {
@@ -247,7 +248,7 @@ impl LightBuffer {
     /// The number of a texel in its tile: squares of 8 × 8, row by row.
     #[inline]
     const fn place_in_tile(x: u32, y: u32) -> usize {
-        ((y >> 3 & 7) << 9 | (x >> 3 & 7) << 6 | (y & 7) << 3 | x & 7) as usize
+        ((((y >> 3) & 7) << 9) | (((x >> 3) & 7) << 6) | ((y & 7) << 3) | (x & 7)) as usize
     }
 
     /// The answer at a place.
