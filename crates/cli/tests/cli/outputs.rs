@@ -67,7 +67,11 @@ fn a_scene_far_from_the_origin_renders_by_default() {
     sandbox.write("far.xml", &text.replace("meshes/", "s/meshes/").replace("</scene>", shape));
     let outcome = sandbox.run(&[&["render", "far.xml", "-q"][..], &TINY].concat());
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    sandbox.fails(&["render", "far.xml", "--method", "amr", "--voxel", "1e-4"], 2, &["the smallest usable voxel size is"]);
+    sandbox.fails(
+        &["render", "far.xml", "--method", "amr", "--voxel", "1e-4"],
+        2,
+        &["the smallest usable voxel size is"],
+    );
 }
 
 #[cfg(target_os = "linux")]
