@@ -6,8 +6,8 @@ pub mod statistics;
 use vdf::{
     geometry::Triangle,
     render::{
-        Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, Roulette,
-        TransmittanceEstimator,
+        Estimator, Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, Roulette,
+        SamplerKind, TransmittanceEstimator,
     },
     scene::{
         Boundary, ComponentFormat, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, PerspectiveSensor,
@@ -26,6 +26,8 @@ pub struct Options {
     pub integrator: Integrator,
     pub transmittance: TransmittanceEstimator,
     pub roulette: Roulette,
+    pub estimator: Estimator,
+    pub sampler: SamplerKind,
     pub spp: Option<u32>,
     pub seed: Option<u64>,
     pub threads: Option<usize>,
@@ -41,6 +43,8 @@ pub fn options() -> Options {
         integrator: Integrator::Volpath,
         transmittance: TransmittanceEstimator::Analytic,
         roulette: Roulette::Standard,
+        estimator: Estimator::Thesis,
+        sampler: SamplerKind::Independent,
         spp: None,
         seed: None,
         threads: Some(2),
@@ -57,8 +61,20 @@ pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
         threads: o.threads,
         ..PrepareOptions::with_method(o.method)
     };
-    let Options { integrator, transmittance, roulette, spp, seed, threads, crop, segment_first, .. } = *o;
-    let options = RenderOptions { integrator, transmittance, roulette, spp, seed, threads, crop, segment_first };
+    let Options { integrator, transmittance, roulette, estimator, sampler, .. } = *o;
+    let Options { spp, seed, threads, crop, segment_first, .. } = *o;
+    let options = RenderOptions {
+        integrator,
+        transmittance,
+        roulette,
+        estimator,
+        sampler,
+        spp,
+        seed,
+        threads,
+        crop,
+        segment_first,
+    };
     PreparedScene::new(scene.clone(), &prepare, &Quiet)?.render(&options, &Quiet)
 }
 

@@ -3,10 +3,13 @@
 //! The light on the ray's axis has no finite integral; it is approached.
 
 use glam::{DVec3, Vec3, dvec3, vec3};
-use vdf::scene::{Emitter, IntegratorSettings, Phase, Rgb, Scene};
+use vdf::{
+    render::Estimator,
+    scene::{Emitter, IntegratorSettings, Phase, Rgb, Scene},
+};
 
 use crate::{
-    check::{Check, INTEGRATORS, VOLPATH},
+    check::{Check, RAYMARCH, VOLPATH, WAYS},
     common::empty_scene,
     fog::{Fog, add_fogs, single_scattering},
 };
@@ -37,8 +40,8 @@ fn compare(check: &mut Check, case: &str, fogs: &[Fog], light: DVec3) {
 
 #[test]
 fn in_unbounded_fog() {
-    for integrator in INTEGRATORS {
-        let mut check = Check::new("single scattering, unbounded", integrator);
+    for way in WAYS {
+        let mut check = Check::by("single scattering, unbounded", way);
         for phase in PHASES {
             for (sigma_t, light) in
                 [(0.7, dvec3(0.0, 0.4, 1.5)), (0.7, dvec3(0.5, -0.6, -1.0)), (4.0, dvec3(0.3, 0.0, 0.6))]
@@ -52,8 +55,8 @@ fn in_unbounded_fog() {
 
 #[test]
 fn in_boxes_of_fog() {
-    for integrator in INTEGRATORS {
-        let mut check = Check::new("single scattering, bounded", integrator);
+    for way in WAYS {
+        let mut check = Check::by("single scattering, bounded", way);
         for phase in PHASES {
             let fog = |min: Vec3, max: Vec3, sigma_t| Fog { min, max, sigma_t, albedo: 0.8, phase };
             let around = fog(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.5, 4.0), 0.7);
@@ -78,25 +81,27 @@ fn in_boxes_of_fog() {
 /// Thin fog is where ray marching must not lose digits (and where a path tracer finds next to nothing).
 #[test]
 fn in_thin_and_in_opaque_fog() {
-    let mut check = Check::new("single scattering, thin to opaque", INTEGRATORS[1]);
-    for sigma_t in [1e-12, 1e-6, 1e-3, 30.0, 1000.0] {
-        let fog = Fog {
-            min: vec3(-1.0, -1.0, 1.0),
-            max: vec3(1.0, 1.0, 4.0),
-            sigma_t,
-            albedo: 1.0,
-            phase: Phase::HenyeyGreenstein { g: 0.3 },
-        };
-        // Seen from the fog's near side, so that something is left of it.
-        compare(&mut check, &format!("σ_t {sigma_t}"), &[fog], dvec3(0.2, 0.1, 0.5));
+    for estimator in Estimator::ALL {
+        let mut check = Check::by("single scattering, thin to opaque", (RAYMARCH, estimator));
+        for sigma_t in [1e-12, 1e-6, 1e-3, 30.0, 1000.0, 1e4] {
+            let fog = Fog {
+                min: vec3(-1.0, -1.0, 1.0),
+                max: vec3(1.0, 1.0, 4.0),
+                sigma_t,
+                albedo: 1.0,
+                phase: Phase::HenyeyGreenstein { g: 0.3 },
+            };
+            // Seen from the fog's near side, so that something is left of it.
+            compare(&mut check, &format!("σ_t {sigma_t}"), &[fog], dvec3(0.2, 0.1, 0.5));
+        }
     }
 }
 
 /// As the light nears the axis the integral grows like 1/h and its estimators' relative variance like 1/h.
 #[test]
 fn with_the_light_near_the_axis() {
-    for integrator in INTEGRATORS {
-        let mut check = Check::new("single scattering, light near the axis", integrator);
+    for way in WAYS {
+        let mut check = Check::by("single scattering, light near the axis", way);
         for phase in [PHASES[0], PHASES[1]] {
             for h in [0.1, 0.01, 0.001] {
                 let fog =
@@ -104,5 +109,26 @@ fn with_the_light_near_the_axis() {
                 compare(&mut check, &format!("{phase:?}, h {h}"), &[fog], dvec3(h, 0.0, 2.2));
             }
         }
+    }
+}
+
+/// What only distances drawn towards the light can do: a light all but on the ray, peaks of the phase function where the light is in front and
+/// where it is behind, a light in clear air that is taken for one in dense fog.
+#[test]
+fn with_all_that_is_hard_for_a_density() {
+    let mut check = Check::by("single scattering, hard for a density", (RAYMARCH, Estimator::Equiangular));
+    let fog =
+        |sigma_t, phase| Fog { min: vec3(-1.0, -1.0, 1.0), max: vec3(1.0, 1.0, 4.0), sigma_t, albedo: 0.8, phase };
+    for h in [1e-5, 1e-7, 1e-9] {
+        compare(&mut check, &format!("h {h}"), &[fog(0.7, Phase::Isotropic)], dvec3(h, 0.0, 2.2));
+    }
+    for g in [0.99, -0.99, 0.999, -0.999] {
+        for light in [dvec3(0.05, 0.0, 0.5), dvec3(0.3, -0.2, 2.5), dvec3(0.05, 0.02, 5.0)] {
+            let phase = Phase::HenyeyGreenstein { g };
+            compare(&mut check, &format!("g {g}, light {light}"), &[fog(0.7, phase)], light);
+        }
+    }
+    for light in [dvec3(0.0, 40.0, 2.0), dvec3(1e6, 0.0, 2.0), dvec3(3.0, 0.0, 1.5)] {
+        compare(&mut check, &format!("light {light}"), &[fog(5.0, Phase::Isotropic)], light);
     }
 }

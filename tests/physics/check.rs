@@ -5,7 +5,7 @@
 //! *Deterministic* ones allow what single precision must round.
 
 use vdf::{
-    render::Integrator,
+    render::{Estimator, Integrator},
     scene::{Rgb, Scene},
 };
 
@@ -15,6 +15,16 @@ pub(crate) const VOLPATH: Integrator = Integrator::Volpath;
 /// So many strata that hardly any noise is left.
 pub(crate) const RAYMARCH: Integrator = Integrator::Raymarch { samples_per_segment: 64 };
 pub(crate) const INTEGRATORS: [Integrator; 2] = [VOLPATH, RAYMARCH];
+/// The ways to trace paths of any number of events.
+pub(crate) const TRACED: [(Integrator, Estimator); 2] =
+    [(VOLPATH, Estimator::Thesis), (VOLPATH, Estimator::Equiangular)];
+/// All ways to find light scattered in fog.
+pub(crate) const WAYS: [(Integrator, Estimator); 4] = [
+    (VOLPATH, Estimator::Thesis),
+    (VOLPATH, Estimator::Equiangular),
+    (RAYMARCH, Estimator::Thesis),
+    (RAYMARCH, Estimator::Equiangular),
+];
 
 /// Roundings that all samples share, of 2⁻²⁴ each: the light's weight and intensity, the phase function or BSDF, the transmittance twice,
 /// their product, the pixel. Those that differ between samples average out.
@@ -24,6 +34,7 @@ const SHARED_ROUNDINGS: f64 = 7.0 / 16_777_216.0;
 pub(crate) struct Check {
     form: &'static str,
     integrator: Integrator,
+    estimator: Estimator,
     cases: u32,
     /// Largest |mean − expected|/expected, and the relative standard error of that case.
     worst: (f64, f64),
@@ -32,7 +43,11 @@ pub(crate) struct Check {
 
 impl Check {
     pub(crate) fn new(form: &'static str, integrator: Integrator) -> Self {
-        Self { form, integrator, cases: 0, worst: (0.0, 0.0), largest_deviation: 0.0 }
+        Self::by(form, (integrator, Estimator::Thesis))
+    }
+
+    pub(crate) fn by(form: &'static str, (integrator, estimator): (Integrator, Estimator)) -> Self {
+        Self { form, integrator, estimator, cases: 0, worst: (0.0, 0.0), largest_deviation: 0.0 }
     }
 
     pub(crate) fn form(&self) -> &'static str {
@@ -44,15 +59,17 @@ impl Check {
     }
 
     fn name(&self) -> &'static str {
-        match self.integrator {
-            Integrator::Volpath => "volpath",
-            Integrator::Raymarch { .. } => "raymarch",
+        match (self.integrator, self.estimator) {
+            (Integrator::Volpath, Estimator::Thesis) => "volpath",
+            (Integrator::Volpath, Estimator::Equiangular) => "volpath, equiangular",
+            (Integrator::Raymarch { .. }, Estimator::Thesis) => "raymarch",
+            (Integrator::Raymarch { .. }, Estimator::Equiangular) => "raymarch, equiangular",
         }
     }
 
     /// The scene's pixels, `spp` samples each.
     pub(crate) fn render(&self, scene: &Scene, spp: u32) -> Vec<Rgb> {
-        let o = Options { integrator: self.integrator, spp: Some(spp), ..options() };
+        let o = Options { integrator: self.integrator, estimator: self.estimator, spp: Some(spp), ..options() };
         rendered(scene, &o).image.pixels
     }
 

@@ -7,29 +7,33 @@ use vdf::{
 };
 
 use crate::{
-    check::{Check, INTEGRATORS, VOLPATH},
+    check::{Check, INTEGRATORS, TRACED, VOLPATH, WAYS},
     common::{add_fog, add_medium, cuboid, empty_scene},
 };
 
 /// Fog of albedo 1 and a box of reflectance 1 under a uniform sky do not darken anything: radiance is 1 everywhere.
 #[test]
 fn nothing_is_lost_under_a_uniform_sky() {
-    let mut check = Check::new("white furnace, uniform sky", VOLPATH);
-    for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.7 }, Phase::HenyeyGreenstein { g: -0.4 }] {
-        let mut scene = empty_scene(32, 1, 0.5);
-        scene.emitters.push(Emitter::Constant { radiance: Rgb::ONE });
-        let fog = add_medium(&mut scene, 1.0, 1.0, phase);
-        add_fog(&mut scene, vec3(-2.0, -2.0, 1.0), vec3(2.0, 2.0, 4.0), fog);
-        scene.surfaces.push(Surface {
-            triangles: cuboid(vec3(-0.5, -0.5, 2.0), vec3(0.7, 0.4, 3.0)),
-            bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
-            radiance: None,
-        });
-        check.mean(&format!("{phase:?}"), &check.render(&scene, 32), 1.0);
-        // From inside the fog.
-        scene.sensor.world_from_camera = DMat4::from_translation(dvec3(0.1, 0.1, 1.2));
-        scene.sensor.medium = Some(fog);
-        check.mean(&format!("inside, {phase:?}"), &check.render(&scene, 32), 1.0);
+    for way in TRACED {
+        let mut check = Check::by("white furnace, uniform sky", way);
+        for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.7 }, Phase::HenyeyGreenstein { g: -0.4 }] {
+            let mut scene = empty_scene(32, 1, 0.5);
+            scene.emitters.push(Emitter::Constant { radiance: Rgb::ONE });
+            // A light that gives none, but is aimed at.
+            scene.emitters.push(Emitter::Point { position: dvec3(1.0, 0.8, 1.8), intensity: Rgb::ZERO });
+            let fog = add_medium(&mut scene, 1.0, 1.0, phase);
+            add_fog(&mut scene, vec3(-2.0, -2.0, 1.0), vec3(2.0, 2.0, 4.0), fog);
+            scene.surfaces.push(Surface {
+                triangles: cuboid(vec3(-0.5, -0.5, 2.0), vec3(0.7, 0.4, 3.0)),
+                bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
+                radiance: None,
+            });
+            check.mean(&format!("{phase:?}"), &check.render(&scene, 32), 1.0);
+            // From inside the fog.
+            scene.sensor.world_from_camera = DMat4::from_translation(dvec3(0.1, 0.1, 1.2));
+            scene.sensor.medium = Some(fog);
+            check.mean(&format!("inside, {phase:?}"), &check.render(&scene, 32), 1.0);
+        }
     }
 }
 
@@ -75,12 +79,14 @@ fn fill(scene: &mut Scene, albedo: f32, phase: Phase) -> MediumId {
 /// from emitters add up.
 #[test]
 fn a_glowing_room_is_uniform() {
-    let mut check = Check::new("white furnace, glowing room", VOLPATH);
-    for (reflectance, spp) in [(0.5, 64), (0.875, 64)] {
-        for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.3 }] {
-            let mut scene = room(1.0 - reflectance, reflectance, false);
-            fill(&mut scene, 1.0, phase);
-            uniform(&mut check, &format!("reflectance {reflectance}, {phase:?}"), &scene, spp, 1.0);
+    for way in TRACED {
+        let mut check = Check::by("white furnace, glowing room", way);
+        for (reflectance, spp) in [(0.5, 64), (0.875, 64)] {
+            for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.3 }] {
+                let mut scene = room(1.0 - reflectance, reflectance, false);
+                fill(&mut scene, 1.0, phase);
+                uniform(&mut check, &format!("reflectance {reflectance}, {phase:?}"), &scene, spp, 1.0);
+            }
         }
     }
 }
@@ -88,22 +94,24 @@ fn a_glowing_room_is_uniform() {
 /// A cavity: fog of albedo 1 between walls of reflectance 1, but for one black wall of radiance 1. Whatever is in it sees radiance 1.
 #[test]
 fn a_cavity_is_uniform() {
-    let mut check = Check::new("white furnace, cavity", VOLPATH);
-    for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.8 }, Phase::HenyeyGreenstein { g: -0.5 }] {
-        let mut scene = room(1.0, 0.0, true);
-        // Roulette at a throughput of 1 is nothing but noise.
-        scene.integrator.rr_depth = 40;
-        fill(&mut scene, 1.0, phase);
-        // The camera looks away from the black wall, then at it; a white body is in its way.
-        let body = Surface {
-            triangles: cuboid(vec3(-0.5, -0.6, -0.8), vec3(0.1, 0.2, -0.4)),
-            bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
-            radiance: None,
-        };
-        scene.surfaces.push(body);
-        for (view, angle) in [("away", std::f64::consts::PI), ("towards", 0.0)] {
-            scene.sensor.world_from_camera = DMat4::from_rotation_y(angle);
-            uniform(&mut check, &format!("{phase:?}, {view}"), &scene, 64, 1.0);
+    for way in TRACED {
+        let mut check = Check::by("white furnace, cavity", way);
+        for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.8 }, Phase::HenyeyGreenstein { g: -0.5 }] {
+            let mut scene = room(1.0, 0.0, true);
+            // Roulette at a throughput of 1 is nothing but noise.
+            scene.integrator.rr_depth = 40;
+            fill(&mut scene, 1.0, phase);
+            // The camera looks away from the black wall, then at it; a white body is in its way.
+            let body = Surface {
+                triangles: cuboid(vec3(-0.5, -0.6, -0.8), vec3(0.1, 0.2, -0.4)),
+                bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
+                radiance: None,
+            };
+            scene.surfaces.push(body);
+            for (view, angle) in [("away", std::f64::consts::PI), ("towards", 0.0)] {
+                scene.sensor.world_from_camera = DMat4::from_rotation_y(angle);
+                uniform(&mut check, &format!("{phase:?}, {view}"), &scene, 64, 1.0);
+            }
         }
     }
 }
@@ -143,12 +151,14 @@ fn half_space(albedo: f32, mu: f64) -> Scene {
 /// isotropic scattering [Chandrasekhar1960].
 #[test]
 fn a_half_space_absorbs_what_it_does_not_reflect() {
-    let mut check = Check::new("energy balance, absorbing half-space", VOLPATH);
-    for albedo in [0.3_f32, 0.7, 0.9] {
-        let h = HFunction::new(f64::from(albedo));
-        for mu in [0.1, 0.5, 1.0] {
-            let expected = 1.0 - (1.0 - f64::from(albedo)).sqrt() * h.at(mu);
-            check.mean(&format!("albedo {albedo}, μ {mu}"), &check.render(&half_space(albedo, mu), 64), expected);
+    for way in TRACED {
+        let mut check = Check::by("energy balance, absorbing half-space", way);
+        for albedo in [0.3_f32, 0.7, 0.9] {
+            let h = HFunction::new(f64::from(albedo));
+            for mu in [0.1, 0.5, 1.0] {
+                let expected = 1.0 - (1.0 - f64::from(albedo)).sqrt() * h.at(mu);
+                check.mean(&format!("albedo {albedo}, μ {mu}"), &check.render(&half_space(albedo, mu), 64), expected);
+            }
         }
     }
 }
@@ -156,8 +166,8 @@ fn a_half_space_absorbs_what_it_does_not_reflect() {
 /// Scattered once: ϖ/2 (1 − μ ln(1 + 1/μ)), the first order of the same.
 #[test]
 fn a_half_space_that_scatters_once() {
-    for integrator in INTEGRATORS {
-        let mut check = Check::new("single scattering, half-space under the sky", integrator);
+    for way in WAYS {
+        let mut check = Check::by("single scattering, half-space under the sky", way);
         for mu in [0.1, 0.5, 1.0] {
             let mut scene = half_space(0.9, mu);
             scene.integrator.max_depth = Some(2);

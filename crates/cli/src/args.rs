@@ -79,6 +79,12 @@ pub(crate) struct RenderArgs {
     /// When paths are ended by chance: as in Mitsuba 3, or earlier, as in the thesis's renderer; the mean is the same
     #[arg(long, value_enum, default_value_t = RouletteName::Standard)]
     pub(crate) roulette: RouletteName,
+    /// How light is looked for: as in the thesis, or with distances and directions drawn towards point lights, too, for less noise; of the same mean
+    #[arg(long, value_enum, default_value_t = EstimatorName::Thesis)]
+    pub(crate) estimator: EstimatorName,
+    /// How the samples of a pixel are spread: each for itself, or so that they fill it, which is less noisy
+    #[arg(long, value_enum, default_value_t = SamplerName::Independent)]
+    pub(crate) sampler: SamplerName,
     /// Ask for a proof of each free flight before a ray is cast for it (volpath); the image is the same
     #[arg(long)]
     pub(crate) segment_first: bool,
@@ -151,6 +157,18 @@ pub(crate) enum RouletteName {
 pub(crate) enum TransmittanceName {
     Analytic,
     Analog,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SamplerName {
+    Independent,
+    Sobol,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EstimatorName {
+    Thesis,
+    Equiangular,
 }
 
 /// List the built-in scenes, or write one to disk.

@@ -77,6 +77,10 @@ pub struct FilmOrigin {
     pub transmittance: &'static str,
     /// Name of the roulette.
     pub roulette: &'static str,
+    /// Name of the estimator of light.
+    pub estimator: &'static str,
+    /// How the samples of a pixel are spread.
+    pub sampler: &'static str,
     /// Seed of the render.
     pub seed: u64,
     /// Width and height of the full film in pixels.
@@ -163,6 +167,8 @@ impl Film {
             ("the integrator", a.integrator != b.integrator),
             ("the estimator of transmittance", a.transmittance != b.transmittance),
             ("the roulette", a.roulette != b.roulette),
+            ("the estimator of light", a.estimator != b.estimator),
+            ("the sampler", a.sampler != b.sampler),
             ("the seed", a.seed != b.seed),
             ("the size of the film", a.full_size != b.full_size),
             ("the crop", a.crop != b.crop),
@@ -231,8 +237,9 @@ mod tests {
 
     fn origin(seed: u64) -> FilmOrigin {
         let crop = PixelRect { x0: 0, y0: 0, x1: 3, y1: 1 };
-        let (transmittance, roulette) = ("analytic", "standard");
-        FilmOrigin { scene: 1, integrator: Integrator::Volpath, transmittance, roulette, seed, full_size: [3, 1], crop }
+        let integrator = Integrator::Volpath;
+        let (transmittance, roulette, estimator, sampler) = ("analytic", "standard", "thesis", "independent");
+        FilmOrigin { scene: 1, integrator, transmittance, roulette, estimator, sampler, seed, full_size: [3, 1], crop }
     }
 
     /// Values whose sums depend on the order: of very different sizes.

@@ -6,7 +6,8 @@ use vdf_scene::{PixelRect, Rgb};
 use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
 use crate::{
-    Camera, FilterSample, Integrator, PixelFilter, PreparedScene, Progress, RenderOptions, Sampler, integrator::Tracer,
+    Camera, FilterSample, Integrator, PixelFilter, PreparedScene, Progress, RenderOptions, Sampler, SamplerKind,
+    integrator::Tracer,
 };
 
 /// Side of a tile in pixels. Only progress sees tiles.
@@ -29,6 +30,7 @@ pub struct PathTracer<'a, R> {
     camera: Camera,
     filter: PixelFilter,
     integrator: Integrator,
+    sampler: SamplerKind,
     seed: u64,
 }
 
@@ -114,11 +116,13 @@ impl<'a> Job<'a> {
                 settings: scene.integrator,
                 transmittance: self.options.transmittance,
                 roulette: self.options.roulette,
+                estimator: self.options.estimator,
                 progress,
             },
             camera: self.camera,
             filter: PixelFilter::new(&scene.film.filter),
             integrator: self.options.integrator,
+            sampler: self.options.sampler,
             seed: self.seed,
         }
     }
@@ -137,7 +141,7 @@ impl<R: Recorder> PathTracer<'_, R> {
     /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.
     #[inline]
     pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> (Rgb, f64) {
-        let mut sampler = Sampler::new(self.seed, x, y, sample);
+        let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
         let FilterSample { offset: [dx, dy], weight } = self.filter.sample(&mut sampler);
         let world = self.tracer.world;
         let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());

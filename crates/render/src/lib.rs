@@ -54,12 +54,14 @@ pub use integrator::{Integrator, UnknownIntegrator};
 pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};
 pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals, RegionSet};
-pub use options::{GridExtent, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator, check_voxel_size};
+pub use options::{
+    Estimator, GridExtent, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator, check_voxel_size,
+};
 pub use phase::PhaseFunction;
 pub use prepared::{PreparedScene, default_voxel_size};
 pub use progress::{Progress, Quiet};
 pub use render::Rendering;
-pub use sampler::Sampler;
+pub use sampler::{Sampler, SamplerKind};
 pub use statistics::{NeighbourhoodSize, PartSize, Statistics};
 pub use threads::{check_threads, on_threads};
 pub use world::{SurfacePoint, World, light_shapes};

@@ -3,7 +3,7 @@
 use vdf_scene::{PixelRect, Scene};
 use vdf_visibility::Method;
 
-use crate::{Integrator, RenderError, threads::check_threads};
+use crate::{Integrator, RenderError, SamplerKind, threads::check_threads};
 
 /// The estimator of transmittance towards emitters; both have the same mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +29,31 @@ impl TransmittanceEstimator {
 
 /// Texels along each side of a face of a light buffer: at most so many.
 const MOST_TEXELS: u32 = 8192;
+
+/// How the integrators draw what leads to light; all have the same mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// The thesis's own: distances by transmittance alone, emitters seen from wherever that leads (Sec. 2.3 and 2.5 in \[Houska2013\]).
+    #[default]
+    Thesis,
+    /// Distances are drawn by the angle that they subtend at a light \[Kulla2012\], too, and by `volpath` directions towards point lights: far less
+    /// noise in thin fog and around lights.
+    Equiangular,
+}
+
+impl Estimator {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Thesis, Self::Equiangular];
+
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Thesis => "thesis",
+            Self::Equiangular => "equiangular",
+        }
+    }
+}
 
 /// When a path is ended by chance. All images have the same mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -134,6 +159,10 @@ pub struct RenderOptions {
     pub transmittance: TransmittanceEstimator,
     /// When paths are ended by chance.
     pub roulette: Roulette,
+    /// How the integrator draws what leads to light.
+    pub estimator: Estimator,
+    /// How the samples of a pixel are spread.
+    pub sampler: SamplerKind,
     /// Samples per pixel; by default the scene's.
     pub spp: Option<u32>,
     /// Seed of the random numbers; by default the scene's.

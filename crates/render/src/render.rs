@@ -113,6 +113,8 @@ pub(crate) fn render_film<'a>(
         integrator: job.options().integrator,
         transmittance: job.options().transmittance.name(),
         roulette: job.options().roulette.name(),
+        estimator: job.options().estimator.name(),
+        sampler: job.options().sampler.name(),
         seed: job.seed(),
         full_size: [scene.film.width, scene.film.height],
         crop,

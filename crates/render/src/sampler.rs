@@ -3,13 +3,56 @@
 //! Idea: SplitMix64 \[Steele2014\] used as a counter-based generator: a 128-bit key is hashed from seed, pixel and
 //! sample; dimension i is the finalizer of the i-th element of the key's Weyl sequence, with the key's other half mixed in
 //! between the rounds so that no two keys share a sequence. No state is shared, so nothing depends on threads or tiles.
+//!
+//! `sobol` fills the pixel instead: the first [`SOBOL_DIMENSIONS`] numbers of a pixel's samples are the coordinates of a Sobol sequence, shuffled and
+//! scrambled after Owen by hashing, with a seed for each pixel \[Burley2020\]. So each sample alone is uniform, and all of them together are even.
+//! The sequence has 23 bits; those below, and all numbers after its last dimension, are independent. After 2¹⁶ samples another one begins.
+
+/// How the samples of a pixel are spread; any is a function of (seed, pixel, sample, dimension) alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SamplerKind {
+    /// Each for itself.
+    #[default]
+    Independent,
+    /// By a Sobol sequence with Owen scrambling: together they fill the pixel, which is less noisy. Numbers of samples that are powers of two
+    /// fill it best.
+    Sobol,
+}
+
+impl SamplerKind {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Independent, Self::Sobol];
+
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Independent => "independent",
+            Self::Sobol => "sobol",
+        }
+    }
+}
 
 /// The random numbers of one sample of one pixel. Each call takes the next dimension.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     counter: u64,
     key: u64,
+    sobol: Option<Sobol>,
 }
+
+/// The numbers of a Sobol sequence that come next.
+#[derive(Clone, Debug)]
+struct Sobol {
+    index: u32,
+    seed: u32,
+    dimension: u32,
+    /// The four dimensions that this one is among.
+    four: [f32; 4],
+}
+
+/// So many dimensions of a path are even: those of about ten events.
+const SOBOL_DIMENSIONS: u32 = 64;
 
 /// 2⁶⁴ divided by the golden ratio: the increment of SplitMix64.
 const WEYL: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -29,7 +72,22 @@ impl Sampler {
     pub fn new(seed: u64, x: u32, y: u32, sample: u32) -> Self {
         let pixel = mix((u64::from(y) << 32) | u64::from(x), seed);
         let key = mix(pixel.wrapping_add(WEYL.wrapping_mul(u64::from(sample) + 1)), seed.rotate_left(32));
-        Self { counter: mix(key ^ pixel.rotate_left(32), WEYL), key }
+        Self { counter: mix(key ^ pixel.rotate_left(32), WEYL), key, sobol: None }
+    }
+
+    /// The numbers of the same sample, spread in this way.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation, reason = "a hash")]
+    pub fn of_kind(kind: SamplerKind, seed: u64, x: u32, y: u32, sample: u32) -> Self {
+        let sobol = match kind {
+            SamplerKind::Independent => None,
+            SamplerKind::Sobol => {
+                let pixel = mix((u64::from(y) << 32) | u64::from(x), seed ^ WEYL);
+                let seed = mix(pixel.wrapping_add(u64::from(sample >> 16)), seed) as u32;
+                Some(Sobol { index: sample & 0xffff, seed, dimension: 0, four: [0.0; 4] })
+            }
+        };
+        Self { sobol, ..Self::new(seed, x, y, sample) }
     }
 
     /// Uniform in [0, 1), a multiple of 2⁻⁵³.
@@ -37,14 +95,35 @@ impl Sampler {
     pub fn next_1d(&mut self) -> f64 {
         self.counter = self.counter.wrapping_add(WEYL);
         #[allow(clippy::cast_precision_loss, reason = "53 bits are exact")]
-        let bits = (mix(self.counter, self.key) >> 11) as f64;
-        bits * (1.0 / 9_007_199_254_740_992.0)
+        let random = (mix(self.counter, self.key) >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0);
+        match &mut self.sobol {
+            None => random,
+            Some(sobol) => sobol.next_1d(random),
+        }
     }
 
     /// Two uniform numbers in [0, 1).
     #[inline]
     pub fn next_2d(&mut self) -> [f64; 2] {
         [self.next_1d(), self.next_1d()]
+    }
+}
+
+impl Sobol {
+    /// The next number, with the bits of `random` below those that the sequence has.
+    #[inline]
+    fn next_1d(&mut self, random: f64) -> f64 {
+        const STEP: f64 = 1.0 / 8_388_608.0;
+        if self.dimension == SOBOL_DIMENSIONS {
+            return random;
+        }
+        if self.dimension.is_multiple_of(4) {
+            self.four = sobol_burley::sample_4d(self.index, self.dimension / 4, self.seed);
+        }
+        let even = f64::from(self.four[(self.dimension % 4) as usize]);
+        self.dimension += 1;
+        // So many bits that the sum is exact, and below 1.
+        even + (random * (STEP.recip() * 128.0)).floor() * (STEP * STEP / 128.0)
     }
 }
 
@@ -91,5 +170,76 @@ mod tests {
     fn stays_in_the_half_open_unit_interval() {
         let mut s = Sampler::new(0, 0, 0, 0);
         assert!((0..100_000).map(|_| s.next_1d()).all(|x| (0.0..1.0).contains(&x)));
+    }
+
+    /// The first 2ᵏ samples of a pixel lie one in each of 2ᵏ strata, in every dimension that is even, and of any two successive ones each
+    /// elementary rectangle of the first two holds one.
+    #[test]
+    fn a_pixel_is_filled() {
+        let n = 1024;
+        let points: Vec<Vec<f64>> = (0..n)
+            .map(|sample| {
+                let mut s = Sampler::of_kind(SamplerKind::Sobol, 5, 17, 4, sample);
+                (0..SOBOL_DIMENSIONS).map(|_| s.next_1d()).collect()
+            })
+            .collect();
+        for k in 1..=10 {
+            let strata = 1 << k;
+            let first = &points[..strata];
+            let index = |x: f64, strata: usize| (x * strata as f64) as usize;
+            for d in 0..SOBOL_DIMENSIONS as usize {
+                let mut seen = vec![false; strata];
+                first.iter().for_each(|p| seen[index(p[d], strata)] = true);
+                assert!(seen.iter().all(|&s| s), "dimension {d}, {strata} samples");
+            }
+            for of_x in 0..=k {
+                let (columns, rows) = (1 << of_x, 1 << (k - of_x));
+                let mut seen = vec![false; strata];
+                first.iter().for_each(|p| seen[index(p[0], columns) * rows + index(p[1], rows)] = true);
+                assert!(seen.iter().all(|&s| s), "{columns} × {rows}");
+            }
+        }
+    }
+
+    /// Each sample alone is uniform over the pixels, also in its low bits: χ² over 256 cells of successive pairs, in the first dimensions, the
+    /// last even ones and those beyond, for samples before and after the end of a sequence. Bounds as above.
+    #[test]
+    fn each_sample_of_a_filled_pixel_is_uniform() {
+        let n = 1 << 15;
+        for (skipped, sample, scale) in [
+            (0, 0, 1.0),
+            (0, 3, 1.0),
+            (0, 65_536, 1.0),
+            (30, 1000, 1.0),
+            (63, 7, 1.0),
+            (80, 7, 1.0),
+            (0, 3, 8_388_608.0),
+        ] {
+            let mut cells = [0_u32; 256];
+            for i in 0..n {
+                let mut s = Sampler::of_kind(SamplerKind::Sobol, 7, i % 256, i / 256, sample);
+                (0..skipped).for_each(|_| _ = s.next_1d());
+                let [a, b] = s.next_2d().map(|x| {
+                    assert!((0.0..1.0).contains(&x));
+                    (x * scale).fract()
+                });
+                cells[(a * 16.0) as usize * 16 + (b * 16.0) as usize] += 1;
+            }
+            let expected = f64::from(n) / 256.0;
+            let chi2: f64 = cells.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
+            assert!(chi2 < 400.0, "sample {sample} from dimension {skipped}, {scale}: χ² = {chi2}");
+        }
+    }
+
+    /// Another pixel, seed or block of samples has another sequence; the independent numbers are as ever.
+    #[test]
+    fn kinds_are_functions_of_their_arguments() {
+        let take = |kind, seed, x, y, sample| Sampler::of_kind(kind, seed, x, y, sample).next_2d();
+        let sobol = take(SamplerKind::Sobol, 1, 2, 3, 4);
+        assert_eq!(sobol, take(SamplerKind::Sobol, 1, 2, 3, 4));
+        for (seed, x, y, sample) in [(0, 2, 3, 4), (1, 3, 2, 4), (1, 2, 3, 5), (1, 2, 3, 4 + 65_536)] {
+            assert_ne!(sobol, take(SamplerKind::Sobol, seed, x, y, sample));
+        }
+        assert_eq!(take(SamplerKind::Independent, 1, 2, 3, 4), Sampler::new(1, 2, 3, 4).next_2d());
     }
 }

@@ -36,6 +36,10 @@ pub struct Statistics {
     pub transmittance: &'static str,
     /// When paths were ended by chance.
     pub roulette: &'static str,
+    /// How the integrator drew what leads to light.
+    pub estimator: &'static str,
+    /// How the samples of a pixel were spread.
+    pub sampler: &'static str,
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
     /// Samples per pixel.
@@ -146,6 +150,8 @@ impl Statistics {
             samples_per_segment: options.integrator.samples_per_segment(),
             transmittance: options.transmittance.name(),
             roulette: options.roulette.name(),
+            estimator: options.estimator.name(),
+            sampler: options.sampler.name(),
             size: job.size(),
             spp: job.spp(),
             seed: job.seed(),
@@ -231,7 +237,11 @@ impl fmt::Display for Statistics {
         if let Some(n) = self.samples_per_segment {
             write!(f, " with {n} samples per segment")?;
         }
-        writeln!(f, ", {} transmittance, {} threads", self.transmittance, self.threads)?;
+        writeln!(
+            f,
+            ", {} transmittance, {} estimator, {} sampler, {} threads",
+            self.transmittance, self.estimator, self.sampler, self.threads
+        )?;
         write!(f, "method         {}", self.method)?;
         if let (Some([x, y, z]), Some(size)) = (self.grid, self.voxel_size) {
             write!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;

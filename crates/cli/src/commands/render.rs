@@ -13,14 +13,15 @@ use vdf_image::{
 };
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Roulette, Statistics, TransmittanceEstimator,
+    Estimator, Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Roulette, SamplerKind, Statistics,
+    TransmittanceEstimator,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
 use vdf_visibility::Method;
 
 use crate::{
-    args::{RenderArgs, RouletteName, TransmittanceName},
+    args::{EstimatorName, RenderArgs, RouletteName, SamplerName, TransmittanceName},
     failure::{Failure, say},
     progress::Reporter,
 };
@@ -115,6 +116,14 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         roulette: match args.roulette {
             RouletteName::Standard => Roulette::Standard,
             RouletteName::Thesis => Roulette::Thesis,
+        },
+        estimator: match args.estimator {
+            EstimatorName::Thesis => Estimator::Thesis,
+            EstimatorName::Equiangular => Estimator::Equiangular,
+        },
+        sampler: match args.sampler {
+            SamplerName::Independent => SamplerKind::Independent,
+            SamplerName::Sobol => SamplerKind::Sobol,
         },
         spp: args.spp,
         seed: args.seed,
@@ -240,6 +249,8 @@ fn attributes(s: &Statistics, name: &str, scene: &Scene) -> Vec<(&'static str, A
         ("vdf.integrator", s.integrator.into()),
         ("vdf.transmittance", s.transmittance.into()),
         ("vdf.roulette", s.roulette.into()),
+        ("vdf.estimator", s.estimator.into()),
+        ("vdf.sampler", s.sampler.into()),
         ("vdf.samplesPerPixel", i64::from(s.spp).into()),
         ("vdf.seed", s.seed.to_string().into()),
         ("vdf.queries", count(s.queries)),

@@ -97,6 +97,8 @@ fn options_out_of_range() {
     render_fails(&["--method", "magic"], 2, &["magic", "amr-sn"]);
     render_fails(&["--integrator", "magic"], 2, &["magic", "volpath"]);
     render_fails(&["--transmittance", "magic"], 2, &["magic", "analytic, analog"]);
+    render_fails(&["--estimator", "magic"], 2, &["magic", "thesis, equiangular"]);
+    render_fails(&["--sampler", "magic"], 2, &["magic", "independent, sobol"]);
     render_fails(&["--samples-per-segment", "7"], 2, &["--samples-per-segment", "--integrator raymarch"]);
     render_fails(
         &["--integrator", "raymarch", "--samples-per-segment", "0"],

@@ -144,6 +144,27 @@ fn transmittance_is_analytic_unless_asked_for() {
 }
 
 #[test]
+fn estimator_and_sampler_are_those_asked_for() {
+    let sandbox = Sandbox::new();
+    for (name, args, estimator, sampler) in [
+        ("default", &[][..], "thesis", "independent"),
+        ("thesis", &["--estimator", "thesis", "--sampler", "independent"], "thesis", "independent"),
+        ("equiangular", &["--estimator", "equiangular"], "equiangular", "independent"),
+        ("sobol", &["--sampler", "sobol"], "thesis", "sobol"),
+    ] {
+        let (exr, json) = (format!("{name}.exr"), format!("{name}.json"));
+        let outcome = sandbox.render(&[args, &["--integrator", "raymarch", "-o", &exr, "--stats", &json]].concat());
+        assert!(outcome.stdout.contains(&format!("{estimator} estimator, {sampler} sampler")), "{}", outcome.stdout);
+        let json: serde_json::Value = serde_json::from_slice(&sandbox.read(&json)).unwrap();
+        assert_eq!((&json["estimator"], &json["sampler"]), (&estimator.into(), &sampler.into()));
+    }
+    let png = |name: &str| sandbox.read(&format!("{name}.png"));
+    assert_eq!(png("default"), png("thesis"));
+    assert_ne!(png("default"), png("equiangular"));
+    assert_ne!(png("default"), png("sobol"));
+}
+
+#[test]
 fn failure_keeps_old_results() {
     let sandbox = Sandbox::new();
     sandbox.write("fog.exr", "old");

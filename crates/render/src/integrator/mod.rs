@@ -1,6 +1,8 @@
 //! The integrators, and what they share: next-event estimation and multiple importance sampling.
 
+mod equiangular;
 mod kind;
+mod mixture;
 mod raymarch;
 mod volpath;
 
@@ -11,7 +13,7 @@ use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
 pub use self::kind::{Integrator, UnknownIntegrator};
 use crate::{
-    PhaseFunction as _, Progress, RegionSet, Roulette, Sampler, TransmittanceEstimator,
+    Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler, TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
     world::{SurfacePoint, World},
 };
@@ -23,6 +25,7 @@ pub(crate) struct Tracer<'a, R> {
     pub(crate) settings: IntegratorSettings,
     pub(crate) transmittance: TransmittanceEstimator,
     pub(crate) roulette: Roulette,
+    pub(crate) estimator: Estimator,
     /// Whom a long path asks whether to stop.
     pub(crate) progress: &'a dyn Progress,
 }
@@ -65,6 +68,9 @@ struct Path {
     crossings: u32,
     /// What light that arrives along the ray is worth at the camera.
     throughput: Rgb,
+    /// The part of the throughput that is there only because the path was drawn from mixtures: small where light is expected. Roulette leaves it
+    /// alone, or it would kill what was just aimed at the light.
+    aim: f64,
     /// Light gathered so far.
     radiance: Rgb,
 }
@@ -78,6 +84,7 @@ impl Path {
             depth: 0,
             crossings: 0,
             throughput: Rgb::ONE,
+            aim: 1.0,
             radiance: Rgb::ZERO,
         }
     }
@@ -101,7 +108,10 @@ impl<R: Recorder> Tracer<'_, R> {
         counters: &mut Counters,
     ) -> Rgb {
         match integrator {
-            Integrator::Volpath => self.volpath(ray, sampler, counters),
+            Integrator::Volpath => match self.estimator {
+                Estimator::Thesis => self.volpath(ray, sampler, counters),
+                Estimator::Equiangular => self.volpath_by_mixture(ray, sampler, counters),
+            },
             Integrator::Raymarch { samples_per_segment } => self.raymarch(ray, samples_per_segment, sampler, counters),
         }
     }
@@ -172,15 +182,7 @@ impl<R: Recorder> Tracer<'_, R> {
         sampler: &mut Sampler,
         counters: &mut Counters,
     ) -> bool {
-        let Some(surface) = surface else {
-            path.radiance += path.throughput * self.background(&path.origin);
-            return false;
-        };
-        path.radiance += path.throughput * self.emitted(&surface, path.ray.direction, &path.origin);
-        path.depth += 1;
-        if !self.may_scatter(path.depth) {
-            return false;
-        }
+        let Some(surface) = self.light_at_end(path, surface) else { return false };
         let vertex = Vertex::OnSurface(surface);
         path.radiance += path.throughput * self.direct_light(surface.point, &vertex, &regions, sampler, counters);
         let (direction, pdf) = sample_diffuse(surface.normal, sampler.next_2d());
@@ -189,6 +191,18 @@ impl<R: Recorder> Tracer<'_, R> {
         path.on_surface = true;
         path.ray = self.ray(surface.point, direction, regions);
         true
+    }
+
+    /// Light of the background, or of the surface at the end of a ray, is gathered. The surface, if the path may scatter there.
+    #[inline]
+    fn light_at_end(&self, path: &mut Path, surface: Option<SurfacePoint>) -> Option<SurfacePoint> {
+        let Some(surface) = surface else {
+            path.radiance += path.throughput * self.background(&path.origin);
+            return None;
+        };
+        path.radiance += path.throughput * self.emitted(&surface, path.ray.direction, &path.origin);
+        path.depth += 1;
+        self.may_scatter(path.depth).then_some(surface)
     }
 
     /// Next-event estimation where direction sampling may find the same light: weighted by the power heuristic.
@@ -233,11 +247,31 @@ impl<R: Recorder> Tracer<'_, R> {
     ) -> Option<(Rgb, f64, f64)> {
         let (u_emitter, u) = (sampler.next_1d(), sampler.next_2d());
         // Drawn even if no one will ask for it: how many numbers an event takes depends on nothing.
-        let flight = match self.transmittance {
+        let flight = self.flight_to_emitter(sampler);
+        let light = self.world.lights.sample(point, u_emitter, u)?;
+        self.connect(point, vertex, regions, &light, flight, counters)
+    }
+
+    /// The optical depth that the way to an emitter must not exceed, for the analog estimate of transmittance.
+    #[inline]
+    fn flight_to_emitter(&self, sampler: &mut Sampler) -> Option<f64> {
+        match self.transmittance {
             TransmittanceEstimator::Analytic => None,
             TransmittanceEstimator::Analog => Some(sample_free_flight(sampler)),
-        };
-        let light = self.world.lights.sample(point, u_emitter, u)?;
+        }
+    }
+
+    /// As [`Tracer::emitter_sample`], for this sample of an emitter.
+    #[inline]
+    fn connect(
+        &self,
+        point: DVec3,
+        vertex: &Vertex,
+        regions: &RegionSet,
+        light: &LightSample,
+        flight: Option<f64>,
+        counters: &mut Counters,
+    ) -> Option<(Rgb, f64, f64)> {
         let (value, pdf) = vertex.eval(light.direction);
         let value = value * light.weight;
         if value.max_element() <= 0.0 {
@@ -307,6 +341,15 @@ impl Vertex {
     }
 }
 
+/// One of so many, each equally likely, by a uniform number, and what is left of it: uniform again.
+#[inline]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
+fn choose(u: f64, n: usize) -> Option<(usize, f64)> {
+    let u = u * n as f64;
+    let i = (u as usize).min(n.checked_sub(1)?);
+    Some((i, (u - i as f64).clamp(0.0, 1.0 - f64::EPSILON / 2.0)))
+}
+
 /// The optical depth of a free flight: it reaches τ with probability exp(−τ).
 #[inline]
 fn sample_free_flight(sampler: &mut Sampler) -> f64 {
@@ -352,7 +395,8 @@ fn survives(path: &mut Path, roulette: Roulette, rr_depth: u32, sampler: &mut Sa
         return true;
     }
     let endless = thesis || path.on_surface || path.depth > MANY_EVENTS || path.ray.regions.is_empty();
-    let q = path.throughput.max_element().min(if endless { MAX_SURVIVAL } else { 1.0 });
+    let worth = path.throughput.max_element() / to_f32(path.aim);
+    let q = worth.min(if endless { MAX_SURVIVAL } else { 1.0 });
     if sampler.next_1d() >= f64::from(q) {
         return false;
     }

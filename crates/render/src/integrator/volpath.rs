@@ -16,7 +16,7 @@ use super::{Origin, Path, PathRay, Tracer, Vertex, sample_free_flight};
 use crate::{PhaseFunction as _, RegionSet, Sampler, media::FreeFlight, world::SurfacePoint};
 
 /// What a ray comes to.
-enum Event {
+pub(super) enum Event {
     /// A collision with the medium.
     Collision { point: DVec3, medium: MediumId, regions: RegionSet },
     /// The first surface, or none; reached in these regions.
@@ -57,7 +57,7 @@ impl<R: Recorder> Tracer<'_, R> {
 
     /// The first event on the path's ray, for a free flight of optical depth `tau`.
     #[inline]
-    fn first_event(&self, path: &mut Path, tau: f64, counters: &mut Counters) -> Event {
+    pub(super) fn first_event(&self, path: &mut Path, tau: f64, counters: &mut Counters) -> Event {
         let on_surface = path.on_surface;
         let ray = &mut path.ray;
         let media = &self.world.media;

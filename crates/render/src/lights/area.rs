@@ -16,6 +16,16 @@ pub(super) struct AreaLight {
     radiance: Rgb,
 }
 
+/// A point of the light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AreaPoint {
+    pub(super) point: DVec3,
+    /// Unit normal of the side that shines.
+    pub(super) normal: DVec3,
+    /// How far a ray to the point ends from its triangle.
+    lift: f64,
+}
+
 impl AreaLight {
     pub(super) fn new(triangles: &[Triangle], radiance: Rgb) -> Self {
         let triangles: Vec<_> = triangles.iter().copied().filter(|t| t.area_normal() != DVec3::ZERO).collect();
@@ -33,15 +43,25 @@ impl AreaLight {
         self.cumulative_area.last().copied().unwrap_or(0.0)
     }
 
-    /// A sample of the light as seen from `from`. `choices` is the number of emitters of which this one was drawn.
+    /// A point, uniform over the area. Nothing can be sampled on an emitter without area.
     #[inline]
-    pub(super) fn sample(&self, emitter: usize, from: DVec3, u: [f64; 2], choices: f64) -> Option<LightSample> {
-        // Nothing can be sampled on an emitter without area.
-        if self.area() <= 0.0 {
-            return None;
-        }
-        let (triangle, point) = self.sample_point(u);
-        let normal = triangle.area_normal().normalize();
+    pub(super) fn sample(&self, u: [f64; 2]) -> Option<AreaPoint> {
+        (self.area() > 0.0).then(|| {
+            let (triangle, point) = self.sample_point(u);
+            AreaPoint { point, normal: triangle.area_normal().normalize(), lift: lift(triangle) }
+        })
+    }
+
+    /// A point of the light as seen from `from`. `choices` is the number of emitters of which this one was drawn.
+    #[inline]
+    pub(super) fn seen_from(
+        &self,
+        emitter: usize,
+        from: DVec3,
+        place: &AreaPoint,
+        choices: f64,
+    ) -> Option<LightSample> {
+        let AreaPoint { point, normal, lift } = *place;
         let d = point - from;
         let distance2 = d.length_squared();
         let direction = d / distance2.sqrt();
@@ -52,7 +72,7 @@ impl AreaLight {
         let pdf = distance2 / (cos_theta * self.area() * choices);
         Some(LightSample {
             emitter,
-            point: point + normal * lift(triangle),
+            point: point + normal * lift,
             direction,
             weight: self.radiance * (1.0 / pdf) as f32,
             pdf,

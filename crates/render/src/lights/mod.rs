@@ -7,7 +7,7 @@ mod point;
 use glam::DVec3;
 use vdf_scene::{Emitter, Rgb, Scene};
 
-use self::area::AreaLight;
+use self::area::{AreaLight, AreaPoint};
 
 /// The emitters of a scene, prepared for sampling.
 #[derive(Debug)]
@@ -41,6 +41,29 @@ pub struct LightSample {
     pub pdf: f64,
     /// Whether the point lies on an occluder, so that the query is superficial (Def. 2 in \[Houska2013\]).
     pub on_surface: bool,
+}
+
+/// A place on an emitter, drawn before it is known from where it will be seen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EmitterPoint {
+    emitter: usize,
+    place: Place,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    Point,
+    Area(AreaPoint),
+    /// The numbers that the direction is drawn with.
+    Infinite([f64; 2]),
+}
+
+impl EmitterPoint {
+    /// The emitter's number.
+    #[inline]
+    pub(crate) const fn emitter(&self) -> usize {
+        self.emitter
+    }
 }
 
 impl Lights {
@@ -80,13 +103,56 @@ impl Lights {
         let n = self.lights.len();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
         let emitter = ((u_emitter * n as f64) as usize).min(n.checked_sub(1)?);
-        let choices = n as f64;
-        match &self.lights[emitter] {
-            Light::Point { position, intensity } => point::sample(emitter, *position, *intensity, from, choices),
-            Light::Area(light) => light.sample(emitter, from, u, choices),
-            Light::Constant { radiance } => {
-                Some(constant::sample(emitter, from, u, *radiance, self.pdf_background(), self.reach))
+        self.seen_from(from, &self.sample_point(emitter, u)?)
+    }
+
+    /// How many emitters there are.
+    #[inline]
+    pub(crate) const fn count(&self) -> usize {
+        self.lights.len()
+    }
+
+    /// Draws a place on an emitter. `None` if it has none.
+    #[inline]
+    pub(crate) fn sample_point(&self, emitter: usize, u: [f64; 2]) -> Option<EmitterPoint> {
+        let place = match &self.lights[emitter] {
+            Light::Point { .. } => Place::Point,
+            Light::Area(light) => Place::Area(light.sample(u)?),
+            Light::Constant { .. } => Place::Infinite(u),
+        };
+        Some(EmitterPoint { emitter, place })
+    }
+
+    /// The place as seen from `from`, one of as many as there are emitters. `None` if there is no light from there.
+    #[inline]
+    pub(crate) fn seen_from(&self, from: DVec3, point: &EmitterPoint) -> Option<LightSample> {
+        let (emitter, choices) = (point.emitter, self.lights.len() as f64);
+        match (&self.lights[emitter], &point.place) {
+            (Light::Point { position, intensity }, _) => point::sample(emitter, *position, *intensity, from, choices),
+            (Light::Area(light), Place::Area(place)) => light.seen_from(emitter, from, place, choices),
+            (Light::Constant { radiance }, Place::Infinite(u)) => {
+                Some(constant::sample(emitter, from, *u, *radiance, self.pdf_background(), self.reach))
             }
+            (Light::Area(_) | Light::Constant { .. }, _) => None,
+        }
+    }
+
+    /// Where a place is and, if it shines to one side only, the unit normal of that side; `None` if it is infinitely far away.
+    #[inline]
+    pub(crate) fn position(&self, point: &EmitterPoint) -> Option<(DVec3, Option<DVec3>)> {
+        match (&self.lights[point.emitter], &point.place) {
+            (Light::Point { position, .. }, _) => Some((*position, None)),
+            (_, Place::Area(place)) => Some((place.point, Some(place.normal))),
+            _ => None,
+        }
+    }
+
+    /// Where an emitter is, if it is a point.
+    #[inline]
+    pub(crate) fn point_position(&self, emitter: usize) -> Option<DVec3> {
+        match self.lights[emitter] {
+            Light::Point { position, .. } => Some(position),
+            _ => None,
         }
     }
 

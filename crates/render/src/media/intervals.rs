@@ -37,6 +37,33 @@ impl MediumIntervals<'_> {
         self.intervals.iter().fold(0.0, |tau, (i, _)| tau + self.media.interval_depth(i, self.length))
     }
 
+    /// The parts, from the start on.
+    pub fn parts(&self) -> impl Iterator<Item = &MediumInterval> {
+        self.intervals.iter().map(|(i, _)| i)
+    }
+
+    /// The part with this number.
+    #[inline]
+    #[must_use]
+    pub fn part(&self, part: usize) -> &MediumInterval {
+        &self.intervals[part].0
+    }
+
+    /// Length of the segment in world units.
+    #[inline]
+    #[must_use]
+    pub const fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// The regions at parameter `t` of part number `part`, which must have a medium.
+    #[inline]
+    #[must_use]
+    pub fn regions_in(&self, part: usize, t: f64) -> RegionSet {
+        let (interval, regions) = &self.intervals[part];
+        self.media.regions_near(&self.segment, &self.start, t, interval, regions)
+    }
+
     /// As [`Media::free_flight`].
     #[inline]
     #[must_use]
@@ -44,7 +71,8 @@ impl MediumIntervals<'_> {
         let mut left = DepthLeft { tau };
         for (i, regions) in &self.intervals {
             if let Some((t, medium)) = left.spend(self.media, i, self.length) {
-                return self.media.collision(&self.segment, &self.start, t, medium, i, regions.clone());
+                let regions = self.media.regions_near(&self.segment, &self.start, t, i, regions);
+                return FreeFlight::Collision { t, medium, regions };
             }
         }
         FreeFlight::Passed(self.end.clone())

@@ -78,6 +78,13 @@ impl Media {
         &self.media[id.0 as usize]
     }
 
+    /// The least extinction coefficient of a medium that takes something away; infinite if none does.
+    #[inline]
+    #[must_use]
+    pub fn least_sigma_t(&self) -> f64 {
+        self.media.iter().map(|m| m.sigma_t).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min)
+    }
+
     /// The medium of a point in these regions, that of the innermost; `None` is vacuum.
     #[inline]
     #[must_use]
@@ -144,30 +151,30 @@ impl Media {
             None => ControlFlow::Continue(()),
         };
         match self.regions.walk(segment, start, spend) {
-            ControlFlow::Break((t, medium, i, regions)) => self.collision(segment, start, t, medium, &i, regions),
+            ControlFlow::Break((t, medium, i, regions)) => {
+                FreeFlight::Collision { t, medium, regions: self.regions_near(segment, start, t, &i, &regions) }
+            }
             ControlFlow::Continue(regions) => FreeFlight::Passed(regions.unwrap_or_else(|| start.clone())),
         }
     }
 
-    /// A collision at `t` in an interval. So close to the interval's ends that the rounded point may lie on the other side of a boundary, the
-    /// regions are those of the point.
+    /// The regions at `t` in an interval that lies in `regions`. So close to the interval's ends that the rounded point may lie on the other
+    /// side of a boundary, they are those of the point.
     #[inline]
-    fn collision(
+    fn regions_near(
         &self,
         segment: &Segment,
         start: &RegionSet,
         t: f64,
-        medium: MediumId,
         i: &MediumInterval,
-        regions: RegionSet,
-    ) -> FreeFlight {
+        regions: &RegionSet,
+    ) -> RegionSet {
         let tolerance = self.regions.tolerance(segment);
-        let regions = if t - i.t0 <= tolerance || i.t1 - t <= tolerance {
+        if t - i.t0 <= tolerance || i.t1 - t <= tolerance {
             self.regions.at_end(&Segment::new(segment.p, segment.at(t)), start)
         } else {
-            regions
-        };
-        FreeFlight::Collision { t, medium, regions }
+            regions.clone()
+        }
     }
 
     /// The intervals of the segment, which starts in `start`.
