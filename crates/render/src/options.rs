@@ -90,7 +90,7 @@ pub enum GridExtent {
 /// How a scene is prepared; see [`PreparedScene`](crate::PreparedScene). `None` leaves it to the default named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrepareOptions {
-    /// Method of acceleration; by default [`Method::for_lights`].
+    /// Method of acceleration; by default [`Method::for_scene`].
     pub method: Option<Method>,
     /// Side of a voxel in world units; by default a 128th of the longest side of what the grid covers.
     pub voxel_size: Option<f64>,

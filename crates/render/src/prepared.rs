@@ -72,7 +72,7 @@ impl PreparedScene {
         progress.phase("distance field");
         let lights = light_shapes(&scene);
         let bounds = *world.grid_bounds(options.grid);
-        let method = options.method.unwrap_or_else(|| Method::for_lights(&lights));
+        let method = options.method.unwrap_or_else(|| Method::for_scene(&lights, world.triangles.len()));
         let build = |method, voxel_size| {
             let options = ProverOptions {
                 method,

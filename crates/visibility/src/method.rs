@@ -153,15 +153,23 @@ impl Method {
         self != Self::NONE && (kind != QueryKind::Superficial || self.point_prover() == PointProver::Buffer)
     }
 
-    /// The method for a scene with such emitters where none is asked for: [`Self::default`] if there is one that a buffer or a neighbourhood
-    /// can be kept for, else [`Self::NONE`]. Towards an infinite emitter there is only the field, which takes longer than it saves wherever it
-    /// was measured (`docs/performance.md`).
+    /// The method for a scene with such emitters and so many occluding triangles where none is asked for. A scene without a light that a
+    /// buffer or a neighbourhood can be kept for gets [`Self::NONE`]: towards an infinite emitter there is only the field, which takes
+    /// longer than it saves wherever it was measured (`docs/performance.md`). Light buffers of large meshes take seconds to build and do not
+    /// fit the caches, so beyond 10,000 triangles it is [`Self::best_with_voxels`], else [`Self::default`].
     #[must_use]
-    pub fn for_lights(lights: &[LightShape<'_>]) -> Self {
+    pub fn for_scene(lights: &[LightShape<'_>], triangles: usize) -> Self {
         let somewhere = lights.iter().any(|light| !matches!(light, LightShape::Infinite));
-        if somewhere { Self::default() } else { Self::NONE }
+        match somewhere {
+            false => Self::NONE,
+            true if triangles > MANY_TRIANGLES => Self::best_with_voxels(),
+            true => Self::default(),
+        }
     }
 }
+
+/// Light buffers of so many triangles are built in some hundredths of a second.
+const MANY_TRIANGLES: usize = 10_000;
 
 /// The table of methods in Markdown, as the README has it: name, what is stored, what a query costs.
 #[must_use]
@@ -230,10 +238,11 @@ mod tests {
     #[test]
     fn a_scene_with_a_light_somewhere_has_a_method() {
         let (point, sky) = (LightShape::Point(glam::DVec3::ZERO), LightShape::Infinite);
-        assert_eq!(Method::for_lights(&[sky, point]), Method::default());
-        assert_eq!(Method::for_lights(&[LightShape::Area(&[])]), Method::default());
+        assert_eq!(Method::for_scene(&[sky, point], 30), Method::default());
+        assert_eq!(Method::for_scene(&[LightShape::Area(&[])], MANY_TRIANGLES), Method::default());
+        assert_eq!(Method::for_scene(&[point], MANY_TRIANGLES + 1), Method::best_with_voxels());
         for none in [&[][..], &[sky]] {
-            assert_eq!(Method::for_lights(none), Method::NONE);
+            assert_eq!(Method::for_scene(none, 30), Method::NONE);
         }
     }
 }

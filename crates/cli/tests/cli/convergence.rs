@@ -67,7 +67,7 @@ fn references(sandbox: &Sandbox) -> Vec<String> {
 #[test]
 fn speed_against_error_in_miniature() {
     let sandbox = Sandbox::new();
-    let settings = ["--samples-per-segment", "1,3", "--reference-spp", "64"];
+    let settings = ["--samples-per-segment", "1,3", "--reference-spp", "4096"];
     let text = measure(&sandbox, &settings).succeeded().stdout;
     for part in ["## volpath", "## raymarch 1", "## raymarch 3", "## Samples per segment", "## Verdict", "93.75 %"] {
         assert!(text.contains(part), "no {part} in {text}");
@@ -81,8 +81,8 @@ fn speed_against_error_in_miniature() {
     let figures = Figures::read(&sandbox);
     for (integrator, reference) in [("volpath", "volpath"), ("raymarch 1", "raymarch 3"), ("raymarch 3", "raymarch 3")]
     {
-        let floor = figures.get("relMSE floor", reference, "none", Some(64), None);
-        assert!(floor > 0.0 && figures.get("relMSE floor bound", reference, "none", Some(64), None) > floor);
+        let floor = figures.get("relMSE floor", reference, "none", Some(4096), None);
+        assert!(floor > 0.0 && figures.get("relMSE floor bound", reference, "none", Some(4096), None) > floor);
         for spp in [1, 2, 4].map(Some) {
             let mut errors: Vec<f64> =
                 (0..5).map(|seed| figures.get("relMSE with floor", integrator, "", spp, Some(seed)) - floor).collect();

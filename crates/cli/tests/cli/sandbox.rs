@@ -84,7 +84,9 @@ impl Outcome {
 
     #[track_caller]
     pub(crate) fn succeeded(self) -> Self {
-        assert_eq!((self.code, self.stderr.as_str()), (Some(0), ""), "{}", self.command);
+        // On a slow machine even a tiny render may take so long that progress is told.
+        let said = self.stderr.lines().filter(|line| !line.ends_with(" %")).collect::<Vec<_>>();
+        assert_eq!((self.code, said), (Some(0), vec![]), "{}", self.command);
         self
     }
 

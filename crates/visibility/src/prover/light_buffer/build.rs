@@ -26,10 +26,10 @@ use super::{
 pub(super) const TILE_TEXELS: usize = (TILE * TILE) as usize;
 
 /// A list that is longer is divided, if that is possible.
-const LONG: usize = 12;
+const LONG: usize = 32;
 
 /// A texel is divided at most so often.
-const DIVISIONS: u32 = 2;
+const DIVISIONS: u32 = 1;
 
 /// Along each side a texel is divided into so many.
 pub(super) const PARTS: u32 = 4;
