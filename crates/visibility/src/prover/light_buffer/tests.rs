@@ -194,15 +194,25 @@ fn nothing_is_said_about_what_is_no_point() {
 #[test]
 fn it_is_the_same_for_any_number_of_threads() {
     let mut random = fastrand::Rng::with_seed(8);
-    let triangles = leaves(&mut random, 20_000, 0.1);
+    // A swarm of small triangles in a few texels of a room, which are divided.
+    let swarm = leaves(&mut random, 5000, 0.04).into_iter();
+    let swarm = swarm.map(|t| Triangle { vertices: t.vertices.map(|v| v * 0.05 + 0.5) });
+    let triangles: Vec<_> = swarm.chain(walls(Vec3::NEG_ONE, Vec3::ONE, 4)).collect();
     let build = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| LightBuffer::build(&triangles, DVec3::ZERO, 128, 1 << 30).expect("a buffer"))
+        pool.install(|| LightBuffer::build(&triangles, DVec3::ZERO, 64, 1 << 30).expect("a buffer"))
     };
     let one = build(1);
     assert_eq!(one, build(3));
     assert!(one.entries.iter().any(|e| e.last == 1), "it has lists");
     assert!(one.texels.iter().any(|t| t.tag.kind() == 2), "it has parts");
+    // Where they are they are asked.
+    for _ in 0..4000 {
+        let from = DVec3::splat(0.5) + random_point(&mut random, 0.06);
+        let answer = one.answer(from);
+        let truth = occluded(&triangles, from, DVec3::ZERO);
+        assert!(answer == Answer::Unknown || (answer == Answer::Occluded) == truth, "{from}");
+    }
 }
 
 /// Triangles behind each other in every direction, whose lists nothing makes shorter: refused, and soon.
