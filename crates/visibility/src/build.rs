@@ -137,6 +137,9 @@ impl Provers {
         let mut kept: Vec<Kept> = lights.iter().map(|_| Kept::default()).collect();
         let mut max_bytes = options.max_bytes;
         if method.point_prover() == PointProver::Buffer {
+            if !triangles.par_iter().all(Triangle::is_finite) {
+                return Err(VoxelError::NonFiniteTriangle.into());
+            }
             report.step(
                 "light buffers",
                 || {

@@ -103,6 +103,10 @@ impl LightBuffer {
     /// # Errors
     /// Why there is none.
     pub fn build(triangles: &[Triangle], light: DVec3, side: u32, max_bytes: u64) -> Result<Self, Refusal> {
+        // Of what is no number nothing is known, and comparisons with it would be believed.
+        if !(light.is_finite() && triangles.par_iter().all(Triangle::is_finite)) {
+            return Err(Refusal::NotFinite);
+        }
         let side = side.next_power_of_two().max(TILE);
         let extent = triangles
             .par_iter()

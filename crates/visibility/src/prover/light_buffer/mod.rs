@@ -56,6 +56,8 @@ pub enum Refusal {
     FarAway,
     /// The buffer would take more memory than is allowed.
     Memory,
+    /// It, or a vertex, is not finite.
+    NotFinite,
 }
 
 impl Refusal {
@@ -66,6 +68,7 @@ impl Refusal {
             Self::OnOccluder => "it lies on an occluder, which blocks every way to it",
             Self::FarAway => "it is too far away for a light buffer",
             Self::Memory => "its light buffer does not fit into the limit of memory",
+            Self::NotFinite => "it, or a vertex, is not finite",
         }
     }
 }

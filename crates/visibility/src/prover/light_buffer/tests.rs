@@ -178,6 +178,10 @@ fn a_light_on_an_occluder_or_far_away_has_no_buffer() {
     assert_eq!(build(dvec3(1.0_f64.next_down(), 0.25, 0.3)), None);
     assert_eq!(build(dvec3(1e5, 0.0, 0.0)), Some(Refusal::FarAway));
     assert_eq!(LightBuffer::build(&room, DVec3::ZERO, 64, 1000).err(), Some(Refusal::Memory));
+    assert_eq!(build(dvec3(0.0, f64::NAN, 0.0)), Some(Refusal::NotFinite));
+    let mut torn = room.clone();
+    torn[5].vertices[1].y = f32::INFINITY;
+    assert_eq!(LightBuffer::build(&torn, DVec3::ZERO, 64, 1 << 30).err(), Some(Refusal::NotFinite));
 }
 
 #[test]
