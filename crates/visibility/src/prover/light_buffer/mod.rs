@@ -237,7 +237,7 @@ impl LightBuffer {
         let face = Face::of(d);
         let [u, v, w] = face.magnitudes(d);
         // The light itself, and what is no number.
-        if !(w > 0.0 && w < f64::MAX) {
+        if !(w > 0.0 && d.is_finite()) {
             return Err(Answer::Unknown);
         }
         let window = &self.windows[face.index()];

@@ -189,7 +189,8 @@ fn nothing_is_said_about_what_is_no_point() {
     let room = walls(Vec3::NEG_ONE, Vec3::ONE, 2);
     let light = dvec3(0.1, 0.2, 0.3);
     let buffer = LightBuffer::build(&room, light, 64, 1 << 30).expect("a buffer");
-    for from in [DVec3::NAN, DVec3::INFINITY, DVec3::X * f64::NAN, DVec3::Y * f64::NEG_INFINITY, light] {
+    let one_is_none = DVec3::ONE.with_y(f64::NAN);
+    for from in [DVec3::NAN, one_is_none, DVec3::INFINITY, DVec3::X * f64::NAN, DVec3::Y * f64::NEG_INFINITY, light] {
         assert_eq!(buffer.answer(from), Answer::Unknown, "{from}");
     }
     assert_eq!(buffer.answer(DVec3::X * 1e300), Answer::Occluded);
