@@ -178,7 +178,9 @@ fn a_replay_measures_all_methods() {
     }
     let spatial = r.hierarchy.class(QueryKind::Spatial).unwrap();
     let other = r.hierarchy.t_other();
-    assert_eq!(other, r.hierarchy.class(QueryKind::Superficial).unwrap().time.median);
+    // The mean over the other classes: a product and a quotient, each rounded, where there is only one.
+    let only = r.hierarchy.class(QueryKind::Superficial).unwrap().time.median;
+    assert!((other / only - 1.0).abs() <= 2.0 * f64::EPSILON, "{other} {only}");
     let mixed = r.p_spatial * r.hierarchy.t_spatial() + (1.0 - r.p_spatial) * other;
     assert!((r.hierarchy.t_query / mixed - 1.0).abs() < 1e-12);
     for m in &r.methods {
