@@ -349,24 +349,3 @@ fn validation_finds_a_field_of_other_occluders() {
         }
     }
 }
-
-/// A long thin grid takes about as long as a cube with as many voxels, and so does each of its orientations. (Clearing
-/// a table of 256 KiB for each slice of 64 voxels took 50 times as long.)
-#[test]
-fn thin_grids_take_no_longer_than_cubes() {
-    let seconds = |x, y, z| {
-        let resolution = Resolution::new(x, y, z);
-        let occupied = set(resolution, [Voxel::new(x / 2, y / 2, z / 2)]);
-        let run = || {
-            let start = std::time::Instant::now();
-            assert_eq!(Dual::build(&occupied).distance(Voxel::new(x / 2, y / 2, z / 2)), 0);
-            start.elapsed().as_secs_f64()
-        };
-        run().min(run())
-    };
-    let cube = seconds(118, 118, 118);
-    for [x, y, z] in [[8, 8, 25_600], [25_600, 8, 8], [8, 25_600, 8], [1, 1, 1_638_400], [1, 1280, 1280]] {
-        let thin = seconds(x, y, z);
-        assert!(thin < 15.0 * cube, "{x} × {y} × {z}: {thin} s, as a cube {cube} s");
-    }
-}
