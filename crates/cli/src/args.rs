@@ -53,8 +53,8 @@ pub(crate) struct RenderArgs {
     /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
-    /// Acceleration of visibility queries; the image is the same with all [default: lb, amr-xsn beyond 10,000 triangles, or none in a scene without
-    /// point and area lights and without --segment-first]
+    /// Acceleration of visibility queries; the image is the same with all [default: lb, amr-xsn beyond 10,000 triangles or 256 lights, or none in a scene
+    /// without point and area lights and without --segment-first]
     #[arg(long, value_name = "METHOD", value_parser = method_parser())]
     pub(crate) method: Option<Method>,
     /// Texels along each side of a face of a light buffer (method lb), rounded up to a power of two [default: auto, about

@@ -125,7 +125,8 @@ impl Provers {
     ///
     /// # Errors
     /// If voxels are needed and their size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and
-    /// field `options.max_bytes`. What is kept for a light and exceeds `max_bytes` is no error: see [`LightReport::fallback`].
+    /// field `options.max_bytes`. What is kept for a light and exceeds `max_bytes`, or 1 GiB together with the others', is no error: see
+    /// [`LightReport::fallback`].
     pub fn build(
         options: &ProverOptions,
         triangles: &[Triangle],
@@ -135,7 +136,7 @@ impl Provers {
         let mut report = BuildReport::default();
         let method = options.method;
         let mut kept: Vec<Kept> = lights.iter().map(|_| Kept::default()).collect();
-        let mut max_bytes = options.max_bytes;
+        let (mut max_bytes, mut lights_bytes) = (options.max_bytes, options.max_bytes.min(LIGHTS_BYTES));
         if method.point_prover() == PointProver::Buffer {
             if !triangles.par_iter().all(Triangle::is_finite) {
                 return Err(VoxelError::NonFiniteTriangle.into());
@@ -151,6 +152,7 @@ impl Provers {
             let bytes = kept.iter().map(Kept::bytes).sum();
             report.parts[0].bytes = bytes;
             max_bytes = max_bytes.saturating_sub(bytes as u64);
+            lights_bytes = lights_bytes.saturating_sub(bytes as u64);
         }
         let wanting = |(light, kept): (&LightShape<'_>, &Kept)| *light != LightShape::Infinite && kept.prover.is_none();
         let needs_voxels = match method.point_prover() {
@@ -170,7 +172,7 @@ impl Provers {
             max_bytes,
             bytes,
         )?;
-        let free = max_bytes.saturating_sub(bytes(grid.resolution()));
+        let free = max_bytes.saturating_sub(bytes(grid.resolution())).min(lights_bytes);
         let occupied = report.step(
             "voxels",
             || Ok(voxelize(&grid, triangles.par_iter().map(|t| t.vertices))?),
@@ -236,13 +238,13 @@ fn default_texels(triangles: usize, bytes_for_each: u64) -> u32 {
     side
 }
 
-/// What all light buffers together may take at most.
-const BUFFER_BYTES: u64 = 1 << 30;
+/// What light buffers and neighbourhoods together may take at most: with more lights each gets too few queries to pay for its own.
+const LIGHTS_BYTES: u64 = 1 << 30;
 
 /// Builds the buffers of all point lights, one after the other, each on all threads, as long as they fit.
 fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[LightShape<'_>], kept: &mut [Kept]) {
     let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count() as u64;
-    let mut free = options.max_bytes.min(BUFFER_BYTES);
+    let mut free = options.max_bytes.min(LIGHTS_BYTES);
     let mut side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), free / count.max(1)));
     for (light, kept) in lights.iter().zip(kept) {
         let LightShape::Point(position) = light else { continue };

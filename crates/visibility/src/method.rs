@@ -155,21 +155,24 @@ impl Method {
 
     /// The method for a scene with such emitters and so many occluding triangles where none is asked for. A scene without a light that a
     /// buffer or a neighbourhood can be kept for gets [`Self::NONE`]: towards an infinite emitter there is only the field, which takes
-    /// longer than it saves wherever it was measured (`docs/performance.md`). Light buffers of large meshes take seconds to build and do not
-    /// fit the caches, so beyond 10,000 triangles it is [`Self::best_with_voxels`], else [`Self::default`].
+    /// longer than it saves wherever it was measured (`docs/performance.md`). Light buffers of large meshes or of many lights take seconds to
+    /// build and do not fit the caches, so beyond 10,000 triangles or 256 lights it is [`Self::best_with_voxels`], else [`Self::default`].
     #[must_use]
     pub fn for_scene(lights: &[LightShape<'_>], triangles: usize) -> Self {
-        let somewhere = lights.iter().any(|light| !matches!(light, LightShape::Infinite));
-        match somewhere {
-            false => Self::NONE,
-            true if triangles > MANY_TRIANGLES => Self::best_with_voxels(),
-            true => Self::default(),
+        let placed = lights.iter().filter(|light| !matches!(light, LightShape::Infinite)).count();
+        match placed {
+            0 => Self::NONE,
+            _ if triangles > MANY_TRIANGLES || placed > MANY_LIGHTS => Self::best_with_voxels(),
+            _ => Self::default(),
         }
     }
 }
 
 /// Light buffers of so many triangles are built in some hundredths of a second.
 const MANY_TRIANGLES: usize = 10_000;
+
+/// A light buffer of a few triangles takes some thousandths of a second, a neighbourhood a tenth of that.
+const MANY_LIGHTS: usize = 256;
 
 /// The table of methods in Markdown, as the README has it: name, what is stored, what a query costs.
 #[must_use]
@@ -241,6 +244,8 @@ mod tests {
         assert_eq!(Method::for_scene(&[sky, point], 30), Method::default());
         assert_eq!(Method::for_scene(&[LightShape::Area(&[])], MANY_TRIANGLES), Method::default());
         assert_eq!(Method::for_scene(&[point], MANY_TRIANGLES + 1), Method::best_with_voxels());
+        assert_eq!(Method::for_scene(&[point; MANY_LIGHTS], 30), Method::default());
+        assert_eq!(Method::for_scene(&[point; MANY_LIGHTS + 1], 30), Method::best_with_voxels());
         for none in [&[][..], &[sky]] {
             assert_eq!(Method::for_scene(none, 30), Method::NONE);
         }
