@@ -1,6 +1,6 @@
 //! Building a light buffer: from the top, tile by tile.
 //!
-//! A tile of 64 × 64 texels gets the triangles whose bounds on the face meet it. It is quartered down to texels; each part gets those of the
+//! A tile of 64 × 64 texels gets the triangles whose bounds on the face meet it. It is divided in sixteen, down to texels; each part gets those of the
 //! triangles that may meet its rectangle and are not certainly behind what covers it. A texel with a long list is divided
 //! further, twice at most, where that makes the lists shorter.
 //!
@@ -31,8 +31,11 @@ const LONG: usize = 32;
 /// A texel is divided at most so often.
 const DIVISIONS: u32 = 1;
 
-/// Along each side a texel is divided into so many.
+/// Along each side a square of texels is divided into so many, and so is a texel.
 pub(super) const PARTS: u32 = 4;
+
+/// The parts of a square.
+const COUNT: usize = (PARTS * PARTS) as usize;
 
 /// A light that is so many diagonals of the geometry away sees it in a few hundredths of a degree; single precision does not tell its
 /// triangles apart any more.
@@ -297,28 +300,57 @@ impl TileBuilder<'_> {
         self.out
     }
 
-    /// Divides a square of texels whose candidates are those from `start`.
+    /// Divides a square of texels whose candidates are those from `start`, in sixteen.
     fn divide(&mut self, x: u32, y: u32, size: u32, start: usize) {
         if self.budget.exceeded() {
             return;
         }
-        let half = size / 2;
+        let part = size / PARTS;
         let end = self.scratch.len();
-        for (x, y) in [(x, y), (x + half, y), (x, y + half), (x + half, y + half)] {
-            let rect = self.window.rect(f64::from(x), f64::from(y), f64::from(half));
-            let covered = self.choose(&rect, start, end);
-            if self.scratch.len() > end {
-                if self.scratch.len() == end + 1 && covered < f64::INFINITY {
-                    self.fill(x, y, half, self.scratch[end].cone);
-                } else if half > 1 {
-                    self.divide(x, y, half, end);
+        let starts = self.sort_into_parts(x, y, part, start);
+        let sorted = self.scratch.len();
+        for (i, of_part) in (0..).zip(starts.windows(2)) {
+            let (x, y) = (x + i % PARTS * part, y + i / PARTS * part);
+            let covered =
+                self.choose(&self.window.rect(f64::from(x), f64::from(y), f64::from(part)), of_part[0], of_part[1]);
+            if self.scratch.len() > sorted {
+                if self.scratch.len() == sorted + 1 && covered < f64::INFINITY {
+                    self.fill(x, y, part, self.scratch[sorted].cone);
+                } else if part > 1 {
+                    self.divide(x, y, part, sorted);
                 } else {
-                    let texel = self.texel(f64::from(x), f64::from(y), 1.0, 0, end, covered);
+                    let texel = self.texel(f64::from(x), f64::from(y), 1.0, 0, sorted, covered);
                     self.out.texels[LightBuffer::place_in_tile(x, y)] = texel;
                 }
             }
-            self.scratch.truncate(end);
+            self.scratch.truncate(sorted);
         }
+        self.scratch.truncate(end);
+    }
+
+    /// Adds the candidates from `start` once more for each part of a square that their bounds meet, part by part: where those of each start,
+    /// and their end.
+    fn sort_into_parts(&mut self, x: u32, y: u32, part: u32, start: usize) -> [usize; COUNT + 1] {
+        let end = self.scratch.len();
+        let parts = |c: &Candidate| self.window.parts(&self.bounds[c.cone as usize], x, y, part);
+        let mut next = [0; COUNT + 1];
+        for candidate in &self.scratch[start..end] {
+            parts(candidate).for_each(|i| next[i + 1] += 1);
+        }
+        next[0] = end;
+        for i in 0..COUNT {
+            next[i + 1] += next[i];
+        }
+        let starts = next;
+        self.scratch.resize(starts[COUNT], Candidate { cone: 0, near: 0.0, far: 0.0 });
+        for i in start..end {
+            let candidate = self.scratch[i];
+            for i in self.window.parts(&self.bounds[candidate.cone as usize], x, y, part) {
+                self.scratch[next[i]] = candidate;
+                next[i] += 1;
+            }
+        }
+        starts
     }
 
     /// Fills a square of texels that one triangle covers, behind which nothing matters.
@@ -335,6 +367,7 @@ impl TileBuilder<'_> {
     /// Puts those of the candidates in `start..end` that may decide something in the rectangle behind them, and says beyond which depth it
     /// is covered.
     fn choose(&mut self, rect: &Rect, start: usize, end: usize) -> f64 {
+        let first = self.scratch.len();
         let mut covered = f64::INFINITY;
         let (u0, u1) = (rect.u - rect.half_u, rect.u + rect.half_u);
         let (v0, v1) = (rect.v - rect.half_v, rect.v + rect.half_v);
@@ -357,15 +390,15 @@ impl TileBuilder<'_> {
             }
             self.scratch.push(Candidate { cone: number, near, far });
         }
-        self.drop_behind(end, covered);
-        let members = self.scratch.len() - end;
+        self.drop_behind(first, covered);
+        let members = self.scratch.len() - first;
         if (2..=sheets::MOST).contains(&members) {
             let cones = &self.cones;
-            let sheet = self.scratch[end..].iter().map(|c| (&cones[c.cone as usize], c.far));
+            let sheet = self.scratch[first..].iter().map(|c| (&cones[c.cone as usize], c.far));
             let beyond = sheets::covered_beyond(sheet, rect);
             if beyond < covered {
                 covered = beyond;
-                self.drop_behind(end, covered);
+                self.drop_behind(first, covered);
             }
         }
         covered
@@ -418,7 +451,6 @@ impl TileBuilder<'_> {
 impl TileBuilder<'_> {
     /// Divides a texel whose candidates are those from `start`: the first of its parts, or `None` if their lists would hardly be shorter.
     fn parts(&mut self, x: f64, y: f64, size: f64, divisions: u32, start: usize) -> Option<usize> {
-        const COUNT: usize = (PARTS * PARTS) as usize;
         let (end, part) = (self.scratch.len(), size / f64::from(PARTS));
         let places = (0..PARTS * PARTS).map(|i| (x + f64::from(i % PARTS) * part, y + f64::from(i / PARTS) * part));
         let mut kept = 0;

@@ -11,11 +11,17 @@
 
 use glam::DVec3;
 
+use super::build::PARTS;
+
 /// By how much a texel is enlarged on every side, in units of `u` and `v`.
 pub(super) const SLACK: f64 = 1.0 / (1_u64 << 46) as f64;
 
 /// Texels along the side of a tile, the unit of building.
 pub(super) const TILE: u32 = 64;
+
+/// By how much rectangles are enlarged, in texels, to find the squares that they meet: a texel is at least 2048 times the slack
+/// ([`Window::new`]), so this is twice the slack or more, and far more than the rounding of a place in texels.
+const MARGIN: f64 = 1.0 / 1024.0;
 
 /// A face of the cube around a light, 0 to 5: twice the axis of the depth, and one more if that is negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,6 +140,22 @@ impl Window {
         }
     }
 
+    /// Of the parts of `size` × `size` texels into which a square from texel (`x`, `y`) is divided, row by row, those that a rectangle of
+    /// directions meets.
+    #[inline]
+    pub(super) fn parts(&self, [u0, u1, v0, v1]: &[f64; 4], x: u32, y: u32, size: u32) -> impl Iterator<Item = usize> {
+        let per_part = f64::from(size).recip();
+        let part = |t: f64, start: f64, scale: f64, first: u32, margin: f64| {
+            let part = ((t - start) * scale - f64::from(first) + margin) * per_part;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what there is")]
+            let part = part.clamp(0.0, f64::from(PARTS - 1)) as usize;
+            part
+        };
+        let columns = part(*u0, self.u0, self.scale_u, x, -MARGIN)..=part(*u1, self.u0, self.scale_u, x, MARGIN);
+        let rows = part(*v0, self.v0, self.scale_v, y, -MARGIN)..=part(*v1, self.v0, self.scale_v, y, MARGIN);
+        rows.flat_map(move |j| columns.clone().map(move |i| j * PARTS as usize + i))
+    }
+
     /// The tiles that a rectangle of directions meets: columns and rows, ends included.
     pub(super) fn tiles(&self, [u0, u1, v0, v1]: [f64; 4]) -> [u32; 4] {
         let last = f64::from(self.side / TILE - 1);
@@ -141,12 +163,11 @@ impl Window {
         let tile = |t: f64, start: f64, scale: f64, margin: f64| {
             ((((t - start) * scale + margin) / f64::from(TILE)).floor().clamp(0.0, last)) as u32
         };
-        let margin = 1.0 / 1024.0;
         [
-            tile(u0, self.u0, self.scale_u, -margin),
-            tile(u1, self.u0, self.scale_u, margin),
-            tile(v0, self.v0, self.scale_v, -margin),
-            tile(v1, self.v0, self.scale_v, margin),
+            tile(u0, self.u0, self.scale_u, -MARGIN),
+            tile(u1, self.u0, self.scale_u, MARGIN),
+            tile(v0, self.v0, self.scale_v, -MARGIN),
+            tile(v1, self.v0, self.scale_v, MARGIN),
         ]
     }
 }
@@ -288,6 +309,48 @@ mod tests {
             assert!((du / w - rect.u).abs() <= rect.half_u - SLACK / 4.0, "{u} {rect:?}");
             assert!((dv / w - rect.v).abs() <= rect.half_v - SLACK / 4.0, "{v} {rect:?}");
         }
+    }
+
+    /// Bounds that meet a part's rectangle, if only by its slack, are given to it; and few others.
+    #[test]
+    fn parts_are_all_that_bounds_meet() {
+        let mut random = fastrand::Rng::with_seed(6);
+        let (mut given, mut met) = (0, 0);
+        for i in 0..20_000 {
+            let window = match i % 3 {
+                0 => Window::new([-1.0, 1.0, -1.0, 1.0], 64, 0),
+                1 => Window::new([0.1, 0.101, -0.3, -0.2999], 1024, 0),
+                _ => Window::new([-1.0, -0.5, 0.9, 1.0], 256, 0),
+            };
+            let size = [1, 4, 16][i / 3 % 3];
+            let [x, y] = [(); 2].map(|()| random.u32(..window.side / (4 * size)) * 4 * size);
+            let square = window.rect(f64::from(x), f64::from(y), f64::from(4 * size));
+            // On a border of a part, beside it by some ulps or by the slack, or anywhere.
+            let mut place = |middle: f64, half: f64| match random.u8(..4) {
+                0 => middle + half * (random.f64() * 2.5 - 1.25),
+                kind => {
+                    let border = middle + half * (f64::from(random.u8(..5)) * 0.5 - 1.0);
+                    let ulps = (random.f64() - 0.5) * [0.0, 1e-15, 2.0 * SLACK][usize::from(kind - 1)];
+                    border + ulps
+                }
+            };
+            let ends = |a: f64, b: f64| [a.min(b), a.max(b)];
+            let [u0, u1] = ends(place(square.u, square.half_u), place(square.u, square.half_u));
+            let [v0, v1] = ends(place(square.v, square.half_v), place(square.v, square.half_v));
+            let parts: Vec<_> = window.parts(&[u0, u1, v0, v1], x, y, size).collect();
+            for part in 0..16 {
+                let (i, j) = ((part % 4) as u32, (part / 4) as u32);
+                let rect = window.rect(f64::from(x + i * size), f64::from(y + j * size), f64::from(size));
+                let meets = u0 <= rect.u + rect.half_u
+                    && u1 >= rect.u - rect.half_u
+                    && v0 <= rect.v + rect.half_v
+                    && v1 >= rect.v - rect.half_v;
+                assert!(!meets || parts.contains(&part), "{u0} {u1} {v0} {v1} {rect:?}");
+                met += usize::from(meets);
+            }
+            given += parts.len();
+        }
+        assert!(given < met + met / 2, "{given} {met}");
     }
 
     #[test]
