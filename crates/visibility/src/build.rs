@@ -227,10 +227,12 @@ impl Kept {
     }
 }
 
-/// Texels along each side of a light buffer's faces where nobody says: about as many in all as there are triangles, and no more than fit.
-fn default_texels(triangles: usize, bytes_for_each: u64) -> u32 {
+/// Texels along each side of a light buffer's faces where nobody says: about as many in all as there are triangles, and no more than fit. With
+/// more than four lights a buffer is asked less often, and half as many along each side have to do.
+fn default_texels(triangles: usize, lights: u64, bytes_for_each: u64) -> u32 {
     let few = (triangles as f64).sqrt() as u32;
-    let mut side = few.next_power_of_two().clamp(128, 1024);
+    let one = few.next_power_of_two().clamp(128, 1024);
+    let mut side = if lights > 4 { one / 2 } else { one };
     // Lists and records take about as much as texels.
     while side > 64 && LightBuffer::texel_bytes(side) * 2 > bytes_for_each {
         side /= 2;
@@ -245,7 +247,7 @@ const LIGHTS_BYTES: u64 = 1 << 30;
 fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[LightShape<'_>], kept: &mut [Kept]) {
     let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count() as u64;
     let mut free = options.max_bytes.min(LIGHTS_BYTES);
-    let mut side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), free / count.max(1)));
+    let mut side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), count, free / count.max(1)));
     for (light, kept) in lights.iter().zip(kept) {
         let LightShape::Point(position) = light else { continue };
         let mut built = LightBuffer::build(triangles, *position, side, free);
