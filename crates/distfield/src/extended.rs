@@ -203,7 +203,7 @@ impl Run {
 }
 
 /// The coordinates of an axis outwards from `min..=max`, which are one, and for all but these the one before.
-fn outwards(min: u32, max: u32, count: u32) -> impl Iterator<Item = (RangeInclusive<u32>, Option<u32>)> {
+pub(crate) fn outwards(min: u32, max: u32, count: u32) -> impl Iterator<Item = (RangeInclusive<u32>, Option<u32>)> {
     let up = (max + 1..count).map(|c| (c..=c, Some(c - 1)));
     let down = (0..min).rev().map(|c| (c..=c, Some(c + 1)));
     std::iter::once((min..=max, None)).chain(up).chain(down)

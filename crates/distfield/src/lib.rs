@@ -3,7 +3,7 @@
 //! A field knows voxels only. It is built from the occupied voxels; then [`SafeZones::proves`] says of two voxels that
 //! no segment between a point of one and a point of the other can be occluded. Where one of the voxels is asked again
 //! and again, a [`Neighbourhood`] answers with one load: [`SafeNeighbourhood`] with what a field proves,
-//! [`ExtendedNeighbourhood`] with all that a free cuboid can prove. Definitions are those of \[Houska2013\], chapters 3
+//! [`ExtendedNeighbourhood`] with all that a free cuboid can prove, [`HopNeighbourhood`] with what several in a row can. Definitions are those of \[Houska2013\], chapters 3
 //! and 4.
 
 mod amr;
@@ -12,6 +12,7 @@ mod dsz;
 mod dual;
 mod error;
 mod extended;
+mod hop;
 mod lines;
 mod manhattan;
 mod metric;
@@ -27,6 +28,7 @@ pub use dsz::Dsz;
 pub use dual::Dual;
 pub use error::FieldError;
 pub use extended::ExtendedNeighbourhood;
+pub use hop::HopNeighbourhood;
 pub use metric::{chessboard_distance, manhattan_distance};
 pub use ndf::{Ndf, NdfBuilder};
 pub use neighbourhood::{Neighbourhood, SafeNeighbourhood};

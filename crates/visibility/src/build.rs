@@ -7,7 +7,7 @@
 use std::time::Instant;
 
 use rayon::prelude::*;
-use vdf_distfield::{ExtendedNeighbourhood, SafeNeighbourhood, VoxelBox};
+use vdf_distfield::{ExtendedNeighbourhood, HopNeighbourhood, SafeNeighbourhood, VoxelBox};
 use vdf_geometry::{Bounds, Triangle};
 use vdf_voxel::{Resolution, Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
@@ -27,7 +27,8 @@ pub struct ProverOptions {
     /// The largest number of voxels that may be built; `amr` takes 8 bytes for each.
     pub max_voxels: u64,
     /// The most memory in bytes that the voxels, the field and what is kept for lights may take together. Building takes
-    /// some more for a while: for each thread that builds the neighbourhood of an area light three bits a voxel.
+    /// some more for a while: for each thread that builds the neighbourhood of an area light three bits a voxel, and by hops a byte
+    /// for that of any light.
     pub max_bytes: u64,
     /// Texels along each side of a face of a light buffer, rounded up to a power of two of at least 64; `None` chooses.
     pub texels: Option<u32>,
@@ -281,6 +282,8 @@ fn shared_bytes(kind: Option<FieldKind>, resolution: Resolution) -> u64 {
 /// Neighbourhoods are built as long as they visit no more voxels or rows than this; each takes a few nanoseconds. It is enough for 500 lights in a
 /// grid of 128³ voxels with safe neighbourhoods, and for 60,000 with extended ones.
 const MOST_VISITS: u64 = 1 << 30;
+/// A voxel takes hops as long as so many visits.
+const HOP_VISITS: u64 = 16;
 const TOO_LARGE: &str = "its neighbourhood does not fit into the limit of memory";
 const TOO_LONG: &str = "the neighbourhoods of so many lights would take too long";
 
@@ -364,6 +367,7 @@ impl LightBuilder<'_> {
         match (plan, self.point) {
             (Plan::Field(_), _) => 0,
             (Plan::Point(_), PointProver::Safe) => r.voxel_count() as u64,
+            (_, PointProver::Hop) => HOP_VISITS.saturating_mul(r.voxel_count() as u64),
             _ => u64::from(r.y()) * u64::from(r.z()),
         }
     }
@@ -375,6 +379,8 @@ impl LightBuilder<'_> {
         match (plan, self.point) {
             (Plan::Field(_), _) | (Plan::Point(_), PointProver::Field) => 0,
             (Plan::Point(_), PointProver::Safe) => VoxelSet::bytes_of(resolution),
+            (Plan::Point(_), PointProver::Hop) => HopNeighbourhood::bytes_of(resolution),
+            (Plan::Area(..), PointProver::Hop) => HopNeighbourhood::bytes_of(resolution).saturating_add(NEAR_BYTES),
             (Plan::Point(_), PointProver::Extended | PointProver::Buffer) => extended,
             (Plan::Area(..), _) => extended.saturating_add(NEAR_BYTES),
         }
@@ -384,7 +390,10 @@ impl LightBuilder<'_> {
         Ok(match plan {
             Plan::Field(fallback) => (LightProver::Field, fallback),
             Plan::Point(voxel) => (self.point_prover(voxel), None),
-            Plan::Area(light, near) => (LightProver::Area(AreaNeighbourhood::build(occluders, light, &near)?), None),
+            Plan::Area(light, near) => {
+                let hops = self.point == PointProver::Hop;
+                (LightProver::Area(AreaNeighbourhood::build(occluders, light, &near, hops)?), None)
+            }
         })
     }
 
@@ -393,6 +402,7 @@ impl LightBuilder<'_> {
             (PointProver::Safe, Some(field)) => {
                 LightProver::Safe(each_field!(field, field => SafeNeighbourhood::new(field, self.occupied, light)))
             }
+            (PointProver::Hop, _) => LightProver::Hop(HopNeighbourhood::new(self.occupied, light.into())),
             (PointProver::Extended | PointProver::Buffer, _) => {
                 LightProver::Extended(ExtendedNeighbourhood::new(self.occupied, light.into()))
             }
@@ -442,8 +452,9 @@ mod tests {
                 PointProver::Field => assert_eq!(bytes, [0, 0]),
                 PointProver::Safe => assert_eq!(bytes[0], 8 * 2 * 100 * 100),
                 PointProver::Extended | PointProver::Buffer => assert_eq!(bytes[0], 8 * 100 * 100),
+                PointProver::Hop => assert_eq!(bytes[0], 8 * 3 * 100 * 100),
             }
-            assert!(bytes[1] < (8 * 100 * 100 + NEAR_BYTES) as usize);
+            assert!(bytes[1] < bytes[0].max(8 * 100 * 100) + NEAR_BYTES as usize);
         }
     }
 
@@ -465,7 +476,7 @@ mod tests {
     #[test]
     fn lights_beyond_the_limit_ask_the_field() {
         let lights: Vec<_> = (0..3_000).map(|n| LightShape::Point(DVec3::splat(0.003 * f64::from(n)))).collect();
-        for (method, each) in [("amr-sn", 160_000), ("ndf-xsn", 80_000)] {
+        for (method, each) in [("amr-sn", 160_000), ("ndf-xsn", 80_000), ("ndf-hop", 240_000)] {
             let shared = build(options(method, 1 << 30), &[]).expect("fits").bytes() as u64;
             let limit = shared + 10 * each + each / 2;
             let report = build(options(method, limit), &lights).expect("fits");
@@ -485,7 +496,7 @@ mod tests {
     fn lights_that_would_take_too_long_ask_the_field() {
         let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(10.0), 0.1, 1 << 20).expect("a million voxels");
         let occupied = VoxelSet::new(grid.resolution());
-        for (point, expected) in [(PointProver::Safe, 1_073), (PointProver::Extended, 5_000)] {
+        for (point, expected) in [(PointProver::Safe, 1_073), (PointProver::Extended, 5_000), (PointProver::Hop, 67)] {
             let builder = LightBuilder { point, grid, occupied: &occupied, field: None };
             let mut plans: Vec<_> = (0..5_000).map(|_| Plan::Point(Voxel { i: 0, j: 0, k: 0 })).collect();
             builder.cut_to_budget(&mut plans, u64::MAX);

@@ -7,11 +7,11 @@
 //!
 //! *Definition.* The light's box holds the voxels of its triangles' bounds, widened by a thousandth of a voxel. An
 //! occluder is *near* if its bounds come within a thousandth of a voxel of that box, else *far*. A segment from voxel U
-//! to a point in the box is proved unoccluded if the cuboid of U and the box is free of far occluders, and the segment
-//! meets no near one.
+//! to a point in the box is proved unoccluded if the cuboid of U and the box is free of far occluders, or hops say
+//! that U sees all of the box past them, and the segment meets no near one.
 //!
-//! *Guarantee.* Both ends lie in the cuboid, so the segment does, and no far occluder meets it; that no near one does
-//! is tested exactly. So the claim is about *all* occluders, the light's own among them: exactly what the hierarchy
+//! *Guarantee.* Both ends lie in the cuboid, so the segment does, and no far occluder meets it, nor one from a voxel that sees
+//! all of the box; that no near one does is tested exactly. So the claim is about *all* occluders, the light's own among them: exactly what the hierarchy
 //! answers.
 //!
 //! *The far occluders' voxels* are those of all occluders, which are known, but for those that only near ones occupy. A
@@ -27,7 +27,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use vdf_distfield::{ExtendedNeighbourhood, Neighbourhood as _, VoxelBox};
+use vdf_distfield::{ExtendedNeighbourhood, HopNeighbourhood, Neighbourhood as _, VoxelBox};
 use vdf_geometry::{Bounds, Bvh, Segment, Triangle};
 use vdf_voxel::{Voxel, VoxelError, VoxelGrid, VoxelSet, voxel_bounds, voxelize};
 
@@ -157,14 +157,30 @@ pub(crate) enum Site {
 #[derive(Debug)]
 pub struct AreaNeighbourhood {
     light: VoxelBox,
-    far: ExtendedNeighbourhood,
+    far: Far,
     near: Bvh,
 }
 
+/// From where all of the light's box is seen past the far occluders.
+#[derive(Debug)]
+enum Far {
+    Cuboids(ExtendedNeighbourhood),
+    Hops(HopNeighbourhood),
+}
+
 impl AreaNeighbourhood {
-    /// The neighbourhood of the light in the box `light`, of which `near` are the near triangles.
-    pub(crate) fn build(occluders: &Occluders<'_>, light: VoxelBox, near: &[Triangle]) -> Result<Self, VoxelError> {
-        let far = ExtendedNeighbourhood::new(&occluders.far_voxels(light, near)?, light);
+    /// The neighbourhood of the light in the box `light`, of which `near` are the near triangles; by `hops` or by cuboids only.
+    pub(crate) fn build(
+        occluders: &Occluders<'_>,
+        light: VoxelBox,
+        near: &[Triangle],
+        hops: bool,
+    ) -> Result<Self, VoxelError> {
+        let occupied = occluders.far_voxels(light, near)?;
+        let far = match hops {
+            true => Far::Hops(HopNeighbourhood::new(&occupied, light)),
+            false => Far::Cuboids(ExtendedNeighbourhood::new(&occupied, light)),
+        };
         Ok(Self { light, far, near: Bvh::new(near) })
     }
 
@@ -173,19 +189,30 @@ impl AreaNeighbourhood {
     #[must_use]
     pub fn proves(&self, grid: &VoxelGrid, from: DVec3, to: DVec3) -> bool {
         let (Some(a), Some(b)) = (grid.voxel_containing(from), grid.voxel_containing(to)) else { return false };
-        self.far.proves(a) && self.light.contains(b) && !self.near.occluded(&Segment::new(from, to))
+        let far = match &self.far {
+            Far::Cuboids(n) => n.proves(a),
+            Far::Hops(n) => n.proves(a),
+        };
+        far && self.light.contains(b) && !self.near.occluded(&Segment::new(from, to))
     }
 
-    /// The number of voxels from which the light's box is free of far occluders.
+    /// The number of voxels from which all of the light's box is seen past the far occluders.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.far.count()
+        match &self.far {
+            Far::Cuboids(n) => n.count(),
+            Far::Hops(n) => n.count(),
+        }
     }
 
     /// The memory of the neighbourhood in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.far.bytes() + self.near.bytes()
+        let far = match &self.far {
+            Far::Cuboids(n) => n.bytes(),
+            Far::Hops(n) => n.bytes(),
+        };
+        far + self.near.bytes()
     }
 }
 
@@ -223,21 +250,31 @@ mod tests {
     }
 
     /// What a build makes of a light.
-    fn build(grid: &VoxelGrid, triangles: &[Triangle], light: &[Triangle]) -> Option<AreaNeighbourhood> {
+    fn build(grid: &VoxelGrid, triangles: &[Triangle], light: &[Triangle], hops: bool) -> Option<AreaNeighbourhood> {
         let occupied = voxels(grid, triangles);
         let occluders = Occluders::new(grid, triangles, &occupied).unwrap();
         match occluders.site(light) {
-            Site::Found { light, near } => Some(AreaNeighbourhood::build(&occluders, light, &near).unwrap()),
+            Site::Found { light, near } => Some(AreaNeighbourhood::build(&occluders, light, &near, hops).unwrap()),
             Site::Nowhere | Site::Crowded => None,
         }
     }
 
     #[test]
     fn a_proof_is_about_all_occluders() {
-        for (size, many) in [(0.3, 10), (0.7, 0), (1.0, 10), (0.05, 3)] {
+        let mut counts = vec![];
+        for (size, many, hops) in [
+            (0.3, 10, false),
+            (0.7, 0, false),
+            (1.0, 10, false),
+            (0.05, 3, false),
+            (0.3, 10, true),
+            (0.7, 0, true),
+            (1.0, 10, true),
+        ] {
             let (triangles, light) = room(many);
             let (grid, bvh) = (grid(size), Bvh::new(&triangles));
-            let n = build(&grid, &triangles, &light).unwrap();
+            let n = build(&grid, &triangles, &light, hops).unwrap();
+            counts.push(n.count());
             let (mut proved, mut free) = (0, 0);
             for i in 0..40_000_u32 {
                 let mut s = fastrand::Rng::with_seed(u64::from(i));
@@ -260,13 +297,14 @@ mod tests {
             }
             assert!(proved * 4 > free, "voxel {size}: {proved} of {free}");
         }
+        assert!(counts[0] < counts[4] && counts[1] < counts[5], "hops prove more: {counts:?}");
     }
 
     #[test]
     fn none_is_built_where_much_is_near() {
         let (triangles, light) = room(200);
-        assert!(build(&grid(0.3), &triangles, &light).is_none());
-        assert!(build(&grid(0.3), &triangles, &[]).is_none());
+        assert!(build(&grid(0.3), &triangles, &light, false).is_none());
+        assert!(build(&grid(0.3), &triangles, &[], false).is_none());
     }
 
     /// The voxels of the far occluders are those of a voxelization of the far ones alone, the slow twin, wherever the
@@ -314,7 +352,7 @@ mod tests {
                 let table = square(vec3(4.5625, 4.1875, 4.5625), 1.5).map(moved);
                 let corner = DVec3::splat(offset.into());
                 let grid = VoxelGrid::covering(corner, corner + 10.0, size, 1 << 24).unwrap();
-                build(&grid, &[light, table].concat(), &light).map(|n| n.count())
+                build(&grid, &[light, table].concat(), &light, false).map(|n| n.count())
             };
             let expected = count(0.0);
             assert!(expected > Some(0));

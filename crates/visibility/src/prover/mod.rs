@@ -5,7 +5,7 @@ mod field;
 mod light_buffer;
 mod provers;
 
-use vdf_distfield::{ExtendedNeighbourhood, Neighbourhood as _, SafeNeighbourhood};
+use vdf_distfield::{ExtendedNeighbourhood, HopNeighbourhood, Neighbourhood as _, SafeNeighbourhood};
 
 pub use area::AreaNeighbourhood;
 pub(crate) use area::{Occluders, Site};
@@ -41,6 +41,8 @@ pub enum LightProver {
     Safe(SafeNeighbourhood),
     /// All that free cuboids prove (4.4.1); for a point light in the grid.
     Extended(ExtendedNeighbourhood),
+    /// All that hops prove; for a point light in the grid.
+    Hop(HopNeighbourhood),
     /// The neighbourhood of an area light's voxel box (4.4.1).
     Area(AreaNeighbourhood),
     /// The light buffer of a point light.
@@ -54,6 +56,7 @@ impl LightProver {
             Self::Field | Self::Buffer(_) => None,
             Self::Safe(n) => Some(n.count()),
             Self::Extended(n) => Some(n.count()),
+            Self::Hop(n) => Some(n.count()),
             Self::Area(n) => Some(n.count()),
         }
     }
@@ -72,6 +75,7 @@ impl LightProver {
             Self::Field => 0,
             Self::Safe(n) => n.bytes(),
             Self::Extended(n) => n.bytes(),
+            Self::Hop(n) => n.bytes(),
             Self::Area(n) => n.bytes(),
             Self::Buffer(buffer) => buffer.bytes(),
         }

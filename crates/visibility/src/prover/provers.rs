@@ -7,15 +7,22 @@ use vdf_voxel::{VoxelGrid, VoxelSet};
 use super::{Answer, DistanceField, FieldProver, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
 
-/// What the neighbourhood of a point light at `to`, in the grid, says of a segment. One that comes from outside is clipped to the grid: along
-/// each axis its part inside lies between the voxel where it enters, which is found by rounding outwards, and the light's own. So it lies in
-/// the cuboid of the two, and outside of the grid there is nothing to be met.
+/// What neighbourhoods of a point light at `to`, in the grid, say of a segment: the first of one that begins in the grid. One that comes from
+/// outside is clipped to the grid: along each axis its part inside lies between the voxel where it enters, which is found by rounding outwards, and
+/// the light's own. So it lies in the cuboid of the two, and outside of the grid there is nothing to be met; but no end of it need be in
+/// the voxel where it enters, so `cuboids` has to be of free cuboids.
 #[inline]
-fn by_neighbourhood<N: Neighbourhood>(grid: &VoxelGrid, neighbourhood: &N, from: DVec3, to: DVec3) -> Answer {
+fn by_neighbourhood(
+    grid: &VoxelGrid,
+    neighbourhood: &impl Neighbourhood,
+    cuboids: &impl Neighbourhood,
+    from: DVec3,
+    to: DVec3,
+) -> Answer {
     if let Some(voxel) = grid.voxel_containing(from) {
         return Answer::unoccluded_if(neighbourhood.proves(voxel));
     }
-    Answer::unoccluded_if(grid.entry_voxel(from, to).is_some_and(|entry| neighbourhood.proves(entry)))
+    Answer::unoccluded_if(grid.entry_voxel(from, to).is_some_and(|entry| cuboids.proves(entry)))
 }
 
 /// So many queries wait for their texels together.
@@ -120,8 +127,9 @@ impl Provers {
     fn answer_spatial(&self, emitter: usize, from: DVec3, to: DVec3) -> Answer {
         let (Some(grid), Some(light)) = (&self.grid, self.lights.get(emitter)) else { return Answer::Unknown };
         match light {
-            LightProver::Safe(n) => by_neighbourhood(grid, n, from, to),
-            LightProver::Extended(n) => by_neighbourhood(grid, n, from, to),
+            LightProver::Safe(n) => by_neighbourhood(grid, n, n, from, to),
+            LightProver::Extended(n) => by_neighbourhood(grid, n, n, from, to),
+            LightProver::Hop(n) => by_neighbourhood(grid, n, n.cuboids(), from, to),
             LightProver::Field | LightProver::Area(_) | LightProver::Buffer(_) => self.answer_between(from, to),
         }
     }
@@ -145,6 +153,7 @@ impl Provers {
             match light {
                 LightProver::Safe(n) => n.validate(occupied)?,
                 LightProver::Extended(n) => n.validate(occupied)?,
+                LightProver::Hop(n) => n.validate(occupied)?,
                 LightProver::Field | LightProver::Area(_) | LightProver::Buffer(_) => {}
             }
         }

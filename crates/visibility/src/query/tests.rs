@@ -1,6 +1,7 @@
 //! Which proofs a question may use.
 
 use glam::{DVec3, Vec3, dvec3};
+use vdf_distfield::Neighbourhood as _;
 use vdf_geometry::{Bounds, Triangle};
 
 use super::*;
@@ -52,6 +53,31 @@ fn each_question_uses_its_own_proofs() {
             assert_eq!(counters.flights, u64::from(segment_first && spatial));
         }
     }
+}
+
+/// The clipped end of a segment from outside is rounded outwards, so hops do not know it: only free cuboids are asked about it.
+#[test]
+fn hops_say_nothing_of_clipped_segments() {
+    let obstacle = Triangle::new(Vec3::splat(0.05), Vec3::new(0.2, 0.1, 0.1), Vec3::new(0.1, 0.2, 0.1));
+    let light = dvec3(1.1, 0.9, 0.8);
+    let provers = liars("ndf-hop".parse().expect("a method"), LightShape::Point(light), &[obstacle]);
+    let (Some(grid), Some(crate::LightProver::Hop(hops))) = (provers.grid(), provers.light(0)) else {
+        panic!("{provers:?}")
+    };
+    let answer = |from| provers.answer(&ShadowQuery { from, to: light, emitter: 0, kind: QueryKind::Spatial });
+    let resolution = grid.resolution();
+    let mut only_by_hops = 0;
+    for voxel in resolution.voxels().filter(|v| v.i == 0 && hops.proves(*v)) {
+        let inside = grid.corner(voxel) + 0.125;
+        assert_eq!(answer(inside), Answer::Unoccluded);
+        let outside = inside - (light - inside) * 0.2;
+        assert_eq!(grid.voxel_containing(outside), None);
+        let Some(entry) = grid.entry_voxel(outside, light) else { continue };
+        let by_cuboid = hops.cuboids().proves(entry);
+        only_by_hops += u32::from(hops.proves(entry) && !by_cuboid);
+        assert_eq!(answer(outside) == Answer::Unoccluded, by_cuboid, "{voxel:?}");
+    }
+    assert!(only_by_hops > 20, "{only_by_hops}");
 }
 
 /// A buffer knows ways to its own light and to nothing else.
