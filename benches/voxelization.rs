@@ -12,8 +12,11 @@ use vdf::{
     voxel::{VoxelGrid, Voxelizer, voxelize_with},
 };
 
-const VOXELIZERS: [(&str, Voxelizer); 2] =
-    [("slices", Voxelizer::Slices), ("separating-axes", Voxelizer::SeparatingAxes)];
+const VOXELIZERS: [(&str, Voxelizer); 3] = [
+    ("slices", Voxelizer::Slices),
+    ("offset-polygon", Voxelizer::OffsetPolygon),
+    ("separating-axes", Voxelizer::SeparatingAxes),
+];
 
 /// The unit cube, `n` voxels along each side.
 fn grid(n: u32) -> VoxelGrid {
@@ -66,6 +69,10 @@ fn bench_input(c: &mut Criterion, name: &str, n: u32, triangles: &[[Vec3; 3]], c
     let voxelized = |method| voxelize_with(method, &grid, triangles.par_iter().copied()).expect("finite vertices");
     let expected = voxelized(Voxelizer::SeparatingAxes);
     assert_eq!(voxelized(Voxelizer::Slices), expected, "{name}: the methods differ");
+    let polygon = voxelized(Voxelizer::OffsetPolygon);
+    assert!(expected.iter().all(|v| polygon.contains(v)), "{name}: the offset polygon misses a voxel");
+    let excess = 100.0 * (polygon.count() as f64 / expected.count() as f64 - 1.0);
+    println!("{name}: the offset polygon marks {excess:.3} % too many voxels");
     let mut group = c.benchmark_group(name);
     group.sample_size(10);
     let elements = if count_voxels { expected.count() } else { triangles.len() };

@@ -2,10 +2,11 @@
 //!
 //! *Idea.* Each triangle is carried to grid coordinates in `f64`, and a method of [`Voxelizer`] finds its voxels. The
 //! default clips the triangle to slices of the grid and the slices to rows; its slow and obvious twin, for tests and
-//! for [`VoxelSet::validate`](crate::VoxelSet::validate), tests voxel by voxel.
+//! for [`VoxelSet::validate`](crate::VoxelSet::validate), tests voxel by voxel. The thesis's own, by an offset polygon, is there to be
+//! compared with.
 //!
 //! *Guarantee.* A voxel is in the set if its closed cube, dilated by 24u·(1 + M), meets the closed triangle of the
-//! converted vertices; that is what the rounding of end points and vertices requires. Both methods aim at the dilation
+//! converted vertices; that is what the rounding of end points and vertices requires. These two methods aim at the dilation
 //! δ of [`VoxelGrid::dilation`] and lose less than δ − 24u·(1 + M) to their own rounding; no voxel is in the set that,
 //! dilated by 2δ, misses the triangle. Both bounds are derived in `docs/numerics.md`. Degenerate triangles are the
 //! segments or points that they are. A triangle in a common face of two voxels marks both.
@@ -16,6 +17,7 @@
 //! *Limits.* What lies outside the grid is not represented: proofs hold if the grid covers all triangles.
 
 mod atomic_bits;
+mod offset_polygon;
 pub(crate) mod separating_axes;
 mod slices;
 
@@ -25,8 +27,8 @@ use rayon::prelude::*;
 pub(crate) use self::atomic_bits::AtomicBits;
 use crate::{Voxel, VoxelError, VoxelGrid, VoxelSet, grid::GridPoint};
 
-/// How triangles become voxels. Both methods keep the guarantee of [`voxelize`]; sets differ at most in voxels that
-/// miss a triangle by less than 2δ.
+/// How triangles become voxels. All methods keep the guarantee of [`voxelize`]; the sets of slices and separating axes differ at most in voxels
+/// that miss a triangle by less than 2δ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Voxelizer {
     /// Clips a triangle to slices and rows of the grid, and fills runs of voxels. The fastest.
@@ -35,6 +37,9 @@ pub enum Voxelizer {
     /// Tests voxels one by one by 13 axes: the slow twin, at a half to a quarter of the speed, with no step in common
     /// with the other but the conversion to grid coordinates and the box of voxels around a triangle.
     SeparatingAxes,
+    /// Scans the offset polygon of the triangle's projection and fills the depths of its plane: the thesis's way (3.5.1 in \[Houska2013\]), slower
+    /// and less tight. For comparison only.
+    OffsetPolygon,
 }
 
 /// The voxels of `grid` that touch one of the triangles, by the default method.
@@ -64,6 +69,7 @@ where
         Voxelizer::SeparatingAxes => {
             scan_all(grid, triangles, |triangle, bits| triangle.scan_by_axes(|[i, j, k]| bits.insert_run(j, k, [i; 2])))
         }
+        Voxelizer::OffsetPolygon => scan_all(grid, triangles, offset_polygon::scan),
     }
 }
 

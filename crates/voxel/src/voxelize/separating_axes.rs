@@ -61,19 +61,19 @@ impl Projection {
 
 /// The normal as an axis, solved for one coordinate.
 #[derive(Clone, Copy, Debug)]
-struct Slab {
+pub(super) struct Slab {
     n: DVec3,
     low: f64,
     high: f64,
     /// The coordinate along which the normal is longest, or the triangle if it has no normal.
-    axis: usize,
+    pub(super) axis: usize,
     /// The normal is long enough to be used.
     usable: bool,
 }
 
 impl Slab {
     /// Prepares the normal axis; `radius` is half of the dilated voxel.
-    fn new(vertices: &[GridPoint; 3], radius: f64) -> Self {
+    pub(super) fn new(vertices: &[GridPoint; 3], radius: f64) -> Self {
         let [GridPoint(a), GridPoint(b), GridPoint(c)] = *vertices;
         let n = (b - a).cross(c - a);
         let norm = n.abs().element_sum();
@@ -88,7 +88,7 @@ impl Slab {
     ///
     /// Errors and radius are both divided by the same coordinate of the normal, so the dilation covers the rounding.
     #[inline]
-    fn depths(&self, u: f64, v: f64) -> (f64, f64) {
+    pub(super) fn depths(&self, u: f64, v: f64) -> (f64, f64) {
         if !self.usable {
             return (f64::NEG_INFINITY, f64::INFINITY);
         }
