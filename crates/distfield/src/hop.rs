@@ -48,9 +48,9 @@ impl HopNeighbourhood {
     pub fn new(occupied: &VoxelSet, light: VoxelBox) -> Self {
         let cuboids = ExtendedNeighbourhood::new(occupied, light);
         let mut voxels = VoxelSet::new(occupied.resolution());
-        visit_free(occupied, light, |voxel, side| {
-            if sees(light, voxel, side, |v| voxels.contains(v)) {
-                voxels.insert(voxel);
+        visit_free(occupied, light, |parts, side| {
+            if sees(light, parts.min(), side, |v| voxels.contains(v)) {
+                voxels.extend(parts.voxels());
             }
         });
         Self { light, voxels, cuboids }
@@ -94,13 +94,15 @@ impl Neighbourhood for HopNeighbourhood {
         self.cuboids.validate(occupied)?;
         let mut visited = VoxelSet::new(occupied.resolution());
         let mut first = None;
-        visit_free(occupied, self.light, |voxel, side| {
-            let found = self.voxels.contains(voxel);
-            let expected = sees(self.light, voxel, side, |v| self.voxels.contains(v));
-            if found != expected {
-                first.get_or_insert(FieldError::Member { voxel, expected, found });
+        visit_free(occupied, self.light, |parts, side| {
+            let expected = sees(self.light, parts.min(), side, |v| self.voxels.contains(v));
+            for voxel in parts.voxels() {
+                let found = self.voxels.contains(voxel);
+                if found != expected {
+                    first.get_or_insert(FieldError::Member { voxel, expected, found });
+                }
+                visited.insert(voxel);
             }
-            visited.insert(voxel);
         });
         let stray = self.voxels.iter().find(|&voxel| !visited.contains(voxel));
         let stray = stray.map(|voxel| FieldError::Member { voxel, expected: false, found: true });
@@ -108,9 +110,9 @@ impl Neighbourhood for HopNeighbourhood {
     }
 }
 
-/// Visits all free voxels, those nearer to the light first, with their d, at most 255; none if the light is partly outside the grid. A merged
-/// voxel is free if all of its parts are; they are visited together.
-fn visit_free(occupied: &VoxelSet, light: VoxelBox, mut visit: impl FnMut(Voxel, u8)) {
+/// Visits all free merged voxels, those nearer to the light first, as the boxes of their parts with their d, at most 255; none if the light is
+/// partly outside the grid.
+fn visit_free(occupied: &VoxelSet, light: VoxelBox, mut visit: impl FnMut(VoxelBox, u8)) {
     let resolution = occupied.resolution();
     let (min, max) = (light.min(), light.max());
     if !resolution.contains(max) {
@@ -143,7 +145,7 @@ fn visit_free(occupied: &VoxelSet, light: VoxelBox, mut visit: impl FnMut(Voxel,
                 let side = if free { around.saturating_add(1) } else { 0 };
                 row[first..=last].fill(side);
                 if free {
-                    parts.voxels().for_each(|part| visit(part, side));
+                    visit(parts, side);
                 }
             }
             for k in slices.clone() {
@@ -157,7 +159,7 @@ fn visit_free(occupied: &VoxelSet, light: VoxelBox, mut visit: impl FnMut(Voxel,
 #[derive(Clone, Copy)]
 struct Reach {
     sign: i64,
-    /// The near end of the light: the merged distance if it is positive, else the light covers the voxel on this axis.
+    /// The near end of the light: the merged distance; 0 if the light covers the voxel on this axis.
     near: i64,
     /// The far end of the light, at least 1.
     far: i64,
@@ -167,15 +169,15 @@ impl Reach {
     fn new(voxel: u32, min: u32, max: u32) -> Self {
         let [voxel, min, max] = [voxel, min, max].map(i64::from);
         if voxel <= max {
-            Self { sign: 1, near: min - voxel, far: max + 1 - voxel }
+            Self { sign: 1, near: (min - voxel).max(0), far: max + 1 - voxel }
         } else {
             Self { sign: -1, near: voxel - max, far: voxel + 1 - min }
         }
     }
 
-    /// How many voxels the cube of side `s` has along this axis.
+    /// How many merged voxels the cube of side `s` has along this axis, up to the light.
     fn width(self, s: i64) -> i64 {
-        if self.near >= s { s } else { self.far }
+        s.min(self.near + 1)
     }
 
     fn at(self, voxel: u32, offset: i64) -> u32 {
@@ -209,12 +211,12 @@ fn footprint(reach: [Reach; 3], axis: usize, s: i64, known: impl Fn([i64; 3]) ->
     let [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
     let [bs, cs] = [b, c].map(|other| {
         let Reach { near: m, far: g, .. } = reach[other];
-        // There it is at (1 − t)p + tq with p in [0, 1] and q in [m, g], g ≥ 1: least for p = 0 and q = m, greatest for p = 1 and q = g.
-        let t = if m < 0 { t1 } else { t0 };
-        let first = (t.0 * m).div_euclid(t.1);
+        // There it is at (1 − t)p + tq with p in [0, 1] and q in [m, g]: least for p = 0, q = m and t0, greatest for p = 1, q = g and t1. Where the
+        // light covers the voxel, the only merged voxel is 0.
+        let first = t0.0 * m / t0.1;
         let high = t1.1 + t1.0 * (g - 1);
-        // Up to the voxel that the greatest is in, not only at.
-        first..((high + t1.1 - 1).div_euclid(t1.1)).min(reach[other].width(s))
+        // Up to the voxel that the greatest is in, not only at; and within the face.
+        first..((high + t1.1 - 1) / t1.1).min(reach[other].width(s))
     });
     let mut offset = [s; 3];
     for u in bs {

@@ -98,6 +98,18 @@ fn more_than_cuboids() {
     }
 }
 
+/// Lights of many voxels, which cover others on one axis or two.
+#[test]
+fn wide_lights() {
+    for seed in 0..20 {
+        let (occupied, mut next) = room(seed);
+        let [x, y, z] = occupied.resolution().sides();
+        let (i, j, k) = (next(x - 6), next(y - 6), next(z - 6));
+        let light = VoxelBox::spanning(Voxel::new(i, j, k), Voxel::new(i + next(7), j + next(3), k + next(7)));
+        check(&occupied, light);
+    }
+}
+
 /// All that is visible past one small obstacle, but for what rounding outwards costs.
 #[test]
 fn around_an_obstacle() {
@@ -107,6 +119,16 @@ fn around_an_obstacle() {
     {
         let [hops, cuboids, shafts] = check(&occupied, light);
         assert!(shafts - hops <= most && cuboids + 300 < hops, "{light:?}: {hops}, {cuboids}, {shafts}");
+    }
+}
+
+#[test]
+fn a_light_outside_the_grid_proves_nothing() {
+    let occupied = VoxelSet::new(Resolution::new(5, 4, 3));
+    for light in [Voxel::new(5, 0, 0), Voxel::new(0, 4, 0), Voxel::new(0, 0, 3), Voxel::new(u32::MAX, 9, 9)] {
+        assert_eq!(check(&occupied, light.into()), [0; 3]);
+        assert_eq!(check(&occupied, VoxelBox::spanning(Voxel::new(1, 1, 1), light)), [0; 3]);
+        assert!(!HopNeighbourhood::new(&occupied, Voxel::new(1, 1, 1).into()).proves(light));
     }
 }
 
