@@ -52,13 +52,28 @@ impl Amr {
     /// Builds the field of these occupied voxels.
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
+        let mut field = Self::zeroed(occupied);
+        let _ = field.sweep_while(occupied, &|| true);
+        field
+    }
+
+    /// [`Self::build`], as long as `next` says so: it is asked once before each of the eight planes, from any thread; if it says no, there is
+    /// no field.
+    #[must_use]
+    pub fn build_while(occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        let mut field = Self::zeroed(occupied);
+        field.sweep_while(occupied, next)?;
+        Some(field)
+    }
+
+    fn zeroed(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut distances = Bytes::zeroed(resolution.voxel_count().saturating_mul(8));
-        distances
-            .par_chunks_exact_mut(resolution.voxel_count())
-            .enumerate()
-            .for_each(|(octant, plane)| sweep(occupied, octant, plane));
-        Self { resolution, distances }
+        Self { resolution, distances: Bytes::zeroed(resolution.voxel_count().saturating_mul(8)) }
+    }
+
+    fn sweep_while(&mut self, occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<()> {
+        let planes = self.distances.par_chunks_exact_mut(self.resolution.voxel_count()).enumerate();
+        planes.map(|(octant, plane)| next().then(|| sweep(occupied, octant, plane))).collect()
     }
 
     /// The distance to the nearest occupied voxel in an octant, in voxels, at most 255; 0 for a voxel that the grid

@@ -59,9 +59,27 @@ impl Dsz {
     /// Builds the field of these occupied voxels.
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
+        let mut field = Self::zeroed(occupied);
+        let _ = field.sweep_while(occupied, &|| true);
+        field
+    }
+
+    /// [`Self::build`], as long as `next` says so: it is asked once before each of the six planes; if it says no, there is no field.
+    #[must_use]
+    pub fn build_while(occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        let mut field = Self::zeroed(occupied);
+        field.sweep_while(occupied, next)?;
+        Some(field)
+    }
+
+    fn zeroed(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut distances = Bytes::zeroed(resolution.voxel_count().saturating_mul(6));
-        for (plane, step) in distances.chunks_exact_mut(resolution.voxel_count()).zip(FACE_STEPS) {
+        Self { resolution, distances: Bytes::zeroed(resolution.voxel_count().saturating_mul(6)) }
+    }
+
+    fn sweep_while(&mut self, occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<()> {
+        for (plane, step) in self.distances.chunks_exact_mut(self.resolution.voxel_count()).zip(FACE_STEPS) {
+            next().then_some(())?;
             let ways = step.map(|s| match s {
                 0 => Ways::Both,
                 1.. => Ways::Plus,
@@ -69,7 +87,7 @@ impl Dsz {
             });
             manhattan::distances(occupied, ways, plane);
         }
-        Self { resolution, distances }
+        Some(())
     }
 
     /// H: the Manhattan distance to the nearest occupied voxel that is not behind `voxel` as seen in the direction of a

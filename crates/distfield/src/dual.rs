@@ -57,12 +57,32 @@ impl Dual {
     /// Builds the field of these occupied voxels.
     #[must_use]
     pub fn build(occupied: &VoxelSet) -> Self {
+        let mut field = Self::zeroed(occupied);
+        let _ = field.walk_while(occupied, &|| true);
+        field
+    }
+
+    /// [`Self::build`], as long as `next` says so: it is asked once before each of the seven planes; if it says no, there is no field.
+    #[must_use]
+    pub fn build_while(occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        let mut field = Self::zeroed(occupied);
+        field.walk_while(occupied, next)?;
+        Some(field)
+    }
+
+    fn zeroed(occupied: &VoxelSet) -> Self {
         let resolution = occupied.resolution();
-        let mut values = Bytes::zeroed(resolution.voxel_count().saturating_mul(7));
-        let (distances, extents) = values.split_at_mut(resolution.voxel_count());
+        Self { resolution, values: Bytes::zeroed(resolution.voxel_count().saturating_mul(7)) }
+    }
+
+    fn walk_while(&mut self, occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<()> {
+        let resolution = self.resolution;
+        let (distances, extents) = self.values.split_at_mut(resolution.voxel_count());
+        next().then_some(())?;
         manhattan::distances(occupied, [Ways::Both; 3], distances);
         let (width, slice) = (resolution.x() as usize, resolution.x() as usize * resolution.y() as usize);
         for (plane, direction) in extents.chunks_exact_mut(resolution.voxel_count()).zip(0..) {
+            next().then_some(())?;
             let backwards = direction % 2 != 0;
             match direction / 2 {
                 0 => plane
@@ -88,7 +108,7 @@ impl Dual {
                 ),
             }
         }
-        Self { resolution, values }
+        Some(())
     }
 
     /// Dist: the Manhattan distance to the nearest occupied voxel, in voxels, at most 255; 0 for a voxel that the grid

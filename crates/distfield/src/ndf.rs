@@ -45,6 +45,13 @@ impl Ndf {
         Self::build_with(NdfBuilder::default(), occupied)
     }
 
+    /// [`Self::build`], if `next` says so: it is asked once before each plane of one byte a voxel, from any thread; and if it says
+    /// no, there is no field.
+    #[must_use]
+    pub fn build_while(occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        next().then(|| Self::build(occupied))
+    }
+
     /// Builds the field of these occupied voxels by a builder of choice; see [`Self::build`].
     #[must_use]
     pub fn build_with(builder: NdfBuilder, occupied: &VoxelSet) -> Self {

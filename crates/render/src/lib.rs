@@ -39,7 +39,6 @@ mod media;
 mod options;
 mod phase;
 mod prepared;
-mod progress;
 mod render;
 mod sampler;
 mod statistics;
@@ -59,9 +58,9 @@ pub use options::{
 };
 pub use phase::PhaseFunction;
 pub use prepared::{PreparedScene, default_voxel_size};
-pub use progress::{Progress, Quiet};
 pub use render::Rendering;
 pub use sampler::{Sampler, SamplerKind};
 pub use statistics::{NeighbourhoodSize, PartSize, Statistics};
 pub use threads::{check_threads, on_threads};
+pub use vdf_visibility::{Progress, Quiet};
 pub use world::{SurfacePoint, World, light_shapes};

@@ -69,7 +69,6 @@ impl PreparedScene {
         if progress.cancelled() {
             return Err(RenderError::Cancelled);
         }
-        progress.phase("distance field");
         let lights = light_shapes(&scene);
         let bounds = *world.grid_bounds(options.grid);
         let method = options.method.unwrap_or_else(|| Method::for_scene(&lights, world.triangles.len()));
@@ -81,14 +80,17 @@ impl PreparedScene {
                 texels: options.texels,
                 ..ProverOptions::default()
             };
-            Provers::build(&options, &world.triangles, bounds, &lights)
+            Provers::build(&options, &world.triangles, bounds, &lights, progress)
         };
         let mut notes = Vec::new();
         let built = match options.voxel_size {
             Some(size) => build(method, size).map(|built| (method, built)),
             None => build_by_default(method, default_voxel_size(&bounds), build, &mut notes),
         };
-        let (method, (provers, build)) = built?;
+        let (method, (provers, build)) = built.map_err(|error| match error {
+            VisibilityError::Cancelled => RenderError::Cancelled,
+            error => error.into(),
+        })?;
         let over_budget = build.over_budget();
         if over_budget > 0 {
             let all = build.lights.len();

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3, dvec3, vec3};
 use vdf_geometry::{Bounds, Bvh, Segment, Triangle, intersect_exact};
 use vdf_render::Lights;
 use vdf_scene::{Emitter, LoadOptions, Rgb, Scene};
-use vdf_visibility::{Answer, LightShape, Method, ProverOptions, Provers, QueryKind, ShadowQuery};
+use vdf_visibility::{Answer, LightShape, Method, ProverOptions, Provers, QueryKind, Quiet, ShadowQuery};
 
 /// Triangles, lights, and all methods on grids of several voxel sizes.
 struct Fixture {
@@ -37,7 +37,7 @@ impl Fixture {
         let shapes: Vec<_> = lights.iter().map(|&position| LightShape::Point(position)).collect();
         let build = |method, voxel_size| {
             let options = ProverOptions { method, voxel_size, max_voxels: 1 << 24, ..ProverOptions::default() };
-            Provers::build(&options, &triangles, Bounds::new(min, max), &shapes).expect("a sound grid").0
+            Provers::build(&options, &triangles, Bounds::new(min, max), &shapes, &Quiet).expect("a sound grid").0
         };
         let provers =
             sizes.iter().flat_map(|&s| Method::all().map(move |m| (m, s))).map(|(m, s)| build(m, s)).collect();
@@ -185,7 +185,7 @@ fn case_10_not_a_number() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut t = square(2.0, 6.0, 4.0);
         t[1].vertices[2].y = bad as f32;
-        assert!(Provers::build(&ProverOptions::default(), &t, Bounds::new(BOX.0, BOX.1), &[]).is_err());
+        assert!(Provers::build(&ProverOptions::default(), &t, Bounds::new(BOX.0, BOX.1), &[], &Quiet).is_err());
         for axis in 0..3 {
             let mut p = v(1.0, 1.0, 1.0);
             p[axis] = bad;

@@ -13,7 +13,7 @@ use vdf_voxel::{Resolution, Voxel, VoxelError, VoxelGrid, VoxelSet, voxelize};
 
 use crate::{
     AreaNeighbourhood, DistanceField, FieldKind, FieldProver, LightBuffer, LightProver, LightShape, Method,
-    PointProver, Provers, Refusal, VisibilityError,
+    PointProver, Progress, Provers, Refusal, VisibilityError,
     prover::{Occluders, Site, each_field},
 };
 
@@ -122,17 +122,19 @@ impl BuildReport {
 
 impl Provers {
     /// Builds what `options.method` needs for the occluders `triangles` and these lights, in a grid that covers
-    /// `bounds`, which must hold all occluders. Runs on the current rayon pool.
+    /// `bounds`, which must hold all occluders. Runs on the current rayon pool. `progress` hears of each step, and in it of light buffers,
+    /// planes of the field and neighbourhoods.
     ///
     /// # Errors
-    /// If voxels are needed and their size is not usable for these bounds, or the grid exceeds `options.max_voxels`, or its voxels and
-    /// field `options.max_bytes`. What is kept for a light and exceeds `max_bytes`, or 1 GiB together with the others', is no error: see
-    /// [`LightReport::fallback`].
+    /// If `progress` asks to stop, which is looked at before each of these; if voxels are needed and their size is not usable for these bounds,
+    /// or the grid exceeds `options.max_voxels`, or its voxels and field `options.max_bytes`. What is kept for a light and exceeds `max_bytes`, or 1 GiB
+    /// together with the others', is no error: see [`LightReport::fallback`].
     pub fn build(
         options: &ProverOptions,
         triangles: &[Triangle],
         bounds: Bounds,
         lights: &[LightShape<'_>],
+        progress: &dyn Progress,
     ) -> Result<(Self, BuildReport), VisibilityError> {
         let mut report = BuildReport::default();
         let method = options.method;
@@ -142,14 +144,7 @@ impl Provers {
             if !triangles.par_iter().all(Triangle::is_finite) {
                 return Err(VoxelError::NonFiniteTriangle.into());
             }
-            report.step(
-                "light buffers",
-                || {
-                    build_buffers(options, triangles, lights, &mut kept);
-                    Ok(())
-                },
-                |()| 0,
-            )?;
+            report.step("light buffers", || build_buffers(options, triangles, lights, &mut kept, progress), |()| 0)?;
             let bytes = kept.iter().map(Kept::bytes).sum();
             report.parts[0].bytes = bytes;
             max_bytes = max_bytes.saturating_sub(bytes as u64);
@@ -174,6 +169,7 @@ impl Provers {
             bytes,
         )?;
         let free = max_bytes.saturating_sub(bytes(grid.resolution())).min(lights_bytes);
+        begin(progress, "voxels", 1)?;
         let occupied = report.step(
             "voxels",
             || Ok(voxelize(&grid, triangles.par_iter().map(|t| t.vertices))?),
@@ -185,12 +181,16 @@ impl Provers {
         (report.occupied, report.voxels) = (occupied.count(), r.voxel_count());
         let field = match kind {
             Some(kind) => {
-                Some(report.step("field", || Ok(DistanceField::build(kind, &occupied)), DistanceField::bytes)?)
+                begin(progress, "distance field", DistanceField::planes(kind))?;
+                let next = || next(progress).is_ok();
+                let build = || DistanceField::build_while(kind, &occupied, &next).ok_or(VisibilityError::Cancelled);
+                Some(report.step("field", build, DistanceField::bytes)?)
             }
             None => None,
         };
         let builder = LightBuilder { point: method.point_prover(), grid, occupied: &occupied, field: field.as_ref() };
-        report.step("neighbourhoods", || builder.build_wanting(triangles, lights, &mut kept, free), |&bytes| bytes)?;
+        let neighbourhoods = || builder.build_wanting(triangles, lights, &mut kept, free, progress);
+        report.step("neighbourhoods", neighbourhoods, |&bytes| bytes)?;
         let field = field.map(|field| FieldProver::new(grid, field));
         Ok((report.finished(Some(grid), field, kept), report))
     }
@@ -212,6 +212,19 @@ impl BuildReport {
         let lights = lights.collect();
         Provers::new(grid, field, lights)
     }
+}
+
+/// A step begins that has so many parts.
+fn begin(progress: &dyn Progress, name: &str, parts: u64) -> Result<(), VisibilityError> {
+    progress.phase(name);
+    progress.work_total(parts);
+    if progress.cancelled() { Err(VisibilityError::Cancelled) } else { Ok(()) }
+}
+
+/// A part of a step begins, and counts as done: parts are told apart by when they begin.
+fn next(progress: &dyn Progress) -> Result<(), VisibilityError> {
+    progress.work_done(1);
+    if progress.cancelled() { Err(VisibilityError::Cancelled) } else { Ok(()) }
 }
 
 /// What is kept for a light so far.
@@ -245,12 +258,20 @@ fn default_texels(triangles: usize, lights: u64, bytes_for_each: u64) -> u32 {
 const LIGHTS_BYTES: u64 = 1 << 30;
 
 /// Builds the buffers of all point lights, one after the other, each on all threads, as long as they fit.
-fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[LightShape<'_>], kept: &mut [Kept]) {
+fn build_buffers(
+    options: &ProverOptions,
+    triangles: &[Triangle],
+    lights: &[LightShape<'_>],
+    kept: &mut [Kept],
+    progress: &dyn Progress,
+) -> Result<(), VisibilityError> {
     let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count() as u64;
+    begin(progress, "light buffers", count)?;
     let mut free = options.max_bytes.min(LIGHTS_BYTES);
     let mut side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), count, free / count.max(1)));
     for (light, kept) in lights.iter().zip(kept) {
         let LightShape::Point(position) = light else { continue };
+        next(progress)?;
         let mut built = LightBuffer::build(triangles, *position, side, free);
         if matches!(built, Err(Refusal::Memory)) && options.texels.is_none() && side > 64 {
             // Those that come after it have no better chance.
@@ -265,17 +286,12 @@ fn build_buffers(options: &ProverOptions, triangles: &[Triangle], lights: &[Ligh
             Err(refusal) => kept.fallback = Some(refusal.reason()),
         }
     }
+    Ok(())
 }
 
 /// The memory of the voxels and of a field over them, in bytes.
 fn shared_bytes(kind: Option<FieldKind>, resolution: Resolution) -> u64 {
-    let planes = match kind {
-        None => 0,
-        Some(FieldKind::Ndf) => 1,
-        Some(FieldKind::Amr) => 8,
-        Some(FieldKind::Dsz) => 6,
-        Some(FieldKind::Dual) => 7,
-    };
+    let planes = kind.map_or(0, DistanceField::planes);
     (resolution.voxel_count() as u64).saturating_mul(planes).saturating_add(VoxelSet::bytes_of(resolution))
 }
 
@@ -283,7 +299,7 @@ fn shared_bytes(kind: Option<FieldKind>, resolution: Resolution) -> u64 {
 /// grid of 128³ voxels with safe neighbourhoods, and for 60,000 with extended ones.
 const MOST_VISITS: u64 = 1 << 30;
 /// A voxel takes hops as long as so many visits.
-const HOP_VISITS: u64 = 16;
+const HOP_VISITS: u64 = 32;
 const TOO_LARGE: &str = "its neighbourhood does not fit into the limit of memory";
 const TOO_LONG: &str = "the neighbourhoods of so many lights would take too long";
 
@@ -316,13 +332,19 @@ impl LightBuilder<'_> {
         lights: &[LightShape<'_>],
         kept: &mut [Kept],
         free: u64,
+        progress: &dyn Progress,
     ) -> Result<usize, VisibilityError> {
         let any_area = self.point != PointProver::Field && lights.iter().any(|l| matches!(l, LightShape::Area(_)));
         let occluders = Occluders::new(&self.grid, if any_area { triangles } else { &[] }, self.occupied)?;
         let mut wanting: Vec<_> = lights.iter().zip(kept).filter(|(_, kept)| kept.prover.is_none()).collect();
         let mut plans: Vec<_> = wanting.par_iter().map(|(light, _)| self.plan(&occluders, light)).collect();
         self.cut_to_budget(&mut plans, free);
-        let built: Vec<_> = plans.into_par_iter().map(|plan| self.build(&occluders, plan)).collect::<Result<_, _>>()?;
+        begin(progress, "neighbourhoods", plans.len() as u64)?;
+        let build = |plan| {
+            next(progress)?;
+            Ok::<_, VisibilityError>(self.build(&occluders, plan)?)
+        };
+        let built: Vec<_> = plans.into_par_iter().map(build).collect::<Result<_, _>>()?;
         let mut bytes = 0;
         for ((_, kept), (prover, fallback)) in wanting.iter_mut().zip(built) {
             bytes += prover.bytes();
@@ -416,6 +438,7 @@ mod tests {
     use glam::{DVec3, Vec3};
 
     use super::*;
+    use crate::Quiet;
 
     #[test]
     fn nothing_takes_no_time() {
@@ -428,7 +451,7 @@ mod tests {
 
     fn build(options: ProverOptions, lights: &[LightShape<'_>]) -> Result<BuildReport, VisibilityError> {
         let bounds = Bounds::new(DVec3::ZERO, DVec3::splat(10.0));
-        Provers::build(&options, &WALL, bounds, lights).map(|(_, report)| report)
+        Provers::build(&options, &WALL, bounds, lights, &Quiet).map(|(_, report)| report)
     }
 
     fn options(method: &str, max_bytes: u64) -> ProverOptions {
@@ -437,6 +460,56 @@ mod tests {
             voxel_size: 0.1,
             max_bytes,
             ..ProverOptions::default()
+        }
+    }
+
+    /// Counts what is done in each phase, and asks to stop at some point.
+    struct Steps {
+        told: std::sync::Mutex<Vec<(String, u64, u64)>>,
+        left: std::sync::atomic::AtomicUsize,
+    }
+
+    impl Progress for Steps {
+        fn phase(&self, name: &str) {
+            self.told.lock().expect("no panic").push((name.to_owned(), 0, 0));
+        }
+        fn work_total(&self, n: u64) {
+            self.told.lock().expect("no panic").last_mut().expect("a phase").1 = n;
+        }
+        fn work_done(&self, n: u64) {
+            self.told.lock().expect("no panic").last_mut().expect("a phase").2 += n;
+        }
+        fn cancelled(&self) -> bool {
+            use std::sync::atomic::Ordering::SeqCst;
+            self.left.fetch_update(SeqCst, SeqCst, |left| left.checked_sub(1)).is_err()
+        }
+    }
+
+    #[test]
+    fn all_that_is_built_is_told_and_can_be_stopped() {
+        let lights = [LightShape::Point(DVec3::splat(2.0)), LightShape::Area(&WALL), LightShape::Infinite];
+        let bounds = Bounds::new(DVec3::ZERO, DVec3::splat(10.0));
+        for (method, expected) in [
+            ("ndf", "voxels 1, distance field 1, neighbourhoods 3"),
+            ("amr-hop", "voxels 1, distance field 8, neighbourhoods 3"),
+            ("dsz-sn", "voxels 1, distance field 6, neighbourhoods 3"),
+            ("dual-xsn", "voxels 1, distance field 7, neighbourhoods 3"),
+            ("lb", "light buffers 1, voxels 1, neighbourhoods 2"),
+        ] {
+            let run = |looks: usize| {
+                let steps = Steps { told: std::sync::Mutex::default(), left: looks.into() };
+                let options = ProverOptions { voxel_size: 1.0, ..options(method, 1 << 30) };
+                let built = Provers::build(&options, &WALL, bounds, &lights, &steps);
+                (built.map(|_| ()), steps.told.into_inner().expect("no panic"), steps.left.into_inner())
+            };
+            let (built, told, left) = run(1000);
+            built.expect("nobody asked to stop");
+            let names: Vec<_> = told.iter().map(|(name, total, _)| format!("{name} {total}")).collect();
+            assert_eq!(names.join(", "), expected);
+            assert!(told.iter().all(|(name, total, done)| name == "voxels" || total == done), "{told:?}");
+            for looks in 0..1000 - left {
+                assert!(matches!(run(looks).0, Err(VisibilityError::Cancelled)), "{method}: {looks}");
+            }
         }
     }
 
@@ -496,7 +569,7 @@ mod tests {
     fn lights_that_would_take_too_long_ask_the_field() {
         let grid = VoxelGrid::covering(DVec3::ZERO, DVec3::splat(10.0), 0.1, 1 << 20).expect("a million voxels");
         let occupied = VoxelSet::new(grid.resolution());
-        for (point, expected) in [(PointProver::Safe, 1_073), (PointProver::Extended, 5_000), (PointProver::Hop, 67)] {
+        for (point, expected) in [(PointProver::Safe, 1_073), (PointProver::Extended, 5_000), (PointProver::Hop, 33)] {
             let builder = LightBuilder { point, grid, occupied: &occupied, field: None };
             let mut plans: Vec<_> = (0..5_000).map(|_| Plan::Point(Voxel { i: 0, j: 0, k: 0 })).collect();
             builder.cut_to_budget(&mut plans, u64::MAX);
@@ -514,7 +587,8 @@ mod tests {
         let reasons = report.expect("fits").lights.iter().map(|l| l.fallback).collect::<Vec<_>>();
         assert_eq!(reasons, [Some("it is outside the grid of voxels"), Some("it has no triangles"), None]);
         let bounds = Bounds::new(DVec3::ZERO, DVec3::splat(10.0));
-        let crowded = Provers::build(&options("amr-xsn", 1 << 30), &many, bounds, &[LightShape::Area(&many[..1])]);
+        let crowded =
+            Provers::build(&options("amr-xsn", 1 << 30), &many, bounds, &[LightShape::Area(&many[..1])], &Quiet);
         assert_eq!(crowded.expect("fits").1.lights[0].fallback, Some("too many triangles are near it"));
         let plain = build(options("amr", 1 << 30), &[outside, LightShape::Area(&WALL)]).expect("fits");
         assert!(plain.lights.iter().all(|l| l.fallback.is_none()), "the method keeps nothing for any light");

@@ -7,7 +7,7 @@
 //! ```
 //! use glam::{DVec3, Vec3};
 //! use vdf_geometry::{Bounds, Bvh, Triangle};
-//! use vdf_visibility::{Counters, LightShape, Method, ProverOptions, Provers, QueryKind, ShadowQuery, Visibility};
+//! use vdf_visibility::{Counters, LightShape, Method, ProverOptions, Provers, QueryKind, Quiet, ShadowQuery, Visibility};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A wall, and a light on its right.
@@ -15,7 +15,7 @@
 //! let light = DVec3::new(0.9, 0.5, 0.5);
 //! let options = ProverOptions { method: "amr-xsn".parse()?, voxel_size: 0.1, ..ProverOptions::default() };
 //! let (provers, report) =
-//!     Provers::build(&options, &wall, Bounds::new(DVec3::ZERO, DVec3::ONE), &[LightShape::Point(light)])?;
+//!     Provers::build(&options, &wall, Bounds::new(DVec3::ZERO, DVec3::ONE), &[LightShape::Point(light)], &Quiet)?;
 //! assert!(report.lights[0].voxels.is_some_and(|n| n > 0));
 //!
 //! let bvh = Bvh::new(&wall);
@@ -34,6 +34,7 @@ mod counters;
 mod error;
 mod light;
 mod method;
+mod progress;
 mod prover;
 mod query;
 
@@ -42,6 +43,7 @@ pub use counters::Counters;
 pub use error::VisibilityError;
 pub use light::LightShape;
 pub use method::{FieldKind, Method, PointProver, UnknownMethod, method_table};
+pub use progress::{Progress, Quiet};
 pub use prover::{
     Answer, AreaNeighbourhood, DistanceField, FieldProver, LightBuffer, LightProver, LookUp, Provers, Refusal,
 };

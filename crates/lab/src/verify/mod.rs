@@ -37,7 +37,7 @@ pub use self::{
     report::{Checks, ClassTally, Failure, GridSummary, MethodTally, Tally, VerifyReport},
     segments::SegmentClass,
 };
-use crate::LabError;
+use crate::{LabError, progress::Part};
 
 /// Segments that are made, asked about and checked in one go.
 const BLOCK: u64 = 4096;
@@ -157,7 +157,7 @@ fn verify_in_pool(
                 threads: options.threads,
                 ..PrepareOptions::default()
             };
-            let with_method = prepared.with_options(&options, progress)?;
+            let with_method = prepared.with_options(&options, &Part(progress))?;
             with_method.provers().validate(&occupied)?;
             methods.push(with_method);
         }

@@ -189,7 +189,10 @@ impl fmt::Display for Failure {
         if let Some(emitter) = self.emitter {
             write!(f, ", to emitter {emitter}")?;
         }
-        write!(f, ": from {from:?} to {to:?}; hierarchy: {}, loop: ", said(self.occluded_by_hierarchy))?;
+        // Its Euclidean length (3.4.1): what is a voxel long fails for other reasons than what is a thousand long.
+        let [x, y, z] = [0, 1, 2].map(|axis| (to[axis] - from[axis]) / self.voxel_size);
+        write!(f, ": from {from:?} to {to:?}, {:.3e} voxels long", x.hypot(y).hypot(z))?;
+        write!(f, "; hierarchy: {}, loop: ", said(self.occluded_by_hierarchy))?;
         f.write_str(said(self.occluded_by_loop))
     }
 }

@@ -156,8 +156,8 @@ fn a_failure_can_be_repeated_from_its_text() {
     };
     assert_eq!(
         failure.to_string(),
-        "ndf: voxel 0.1, axis 7, to emitter 0: from [-0.0, 0.10000000000000002, 1e300] to [1.0, 1.0, 1.0]; \
-         hierarchy: occluded, loop: not asked"
+        "ndf: voxel 0.1, axis 7, to emitter 0: from [-0.0, 0.10000000000000002, 1e300] to [1.0, 1.0, 1.0], \
+         1.000e301 voxels long; hierarchy: occluded, loop: not asked"
     );
 }
 

@@ -59,6 +59,29 @@ impl DistanceField {
         }
     }
 
+    /// [`Self::build`], as long as `next` says so: it is asked once before each of the [`planes`](Self::planes) of the field, from any thread;
+    /// if it says no, there is no field.
+    #[must_use]
+    pub fn build_while(kind: FieldKind, occupied: &VoxelSet, next: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
+        Some(match kind {
+            FieldKind::Ndf => Self::Ndf(Ndf::build_while(occupied, next)?),
+            FieldKind::Amr => Self::Amr(Amr::build_while(occupied, next)?),
+            FieldKind::Dsz => Self::Dsz(Dsz::build_while(occupied, next)?),
+            FieldKind::Dual => Self::Dual(Dual::build_while(occupied, next)?),
+        })
+    }
+
+    /// The bytes that a field of that kind has for each voxel: it is built in as many planes.
+    #[must_use]
+    pub const fn planes(kind: FieldKind) -> u64 {
+        match kind {
+            FieldKind::Ndf => 1,
+            FieldKind::Amr => 8,
+            FieldKind::Dsz => 6,
+            FieldKind::Dual => 7,
+        }
+    }
+
     /// Its memory in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {

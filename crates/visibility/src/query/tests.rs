@@ -5,13 +5,13 @@ use vdf_distfield::Neighbourhood as _;
 use vdf_geometry::{Bounds, Triangle};
 
 use super::*;
-use crate::{LightShape, Method, ProverOptions};
+use crate::{LightShape, Method, ProverOptions, Quiet};
 
 /// Provers of a scene without the occluder that the hierarchy knows: whoever believes them can be told by a wrong answer.
 fn liars(method: Method, light: LightShape<'_>, others: &[Triangle]) -> Provers {
     let bounds = Bounds::new(DVec3::splat(-2.0), DVec3::splat(2.0));
     let options = ProverOptions { method, voxel_size: 0.25, ..ProverOptions::default() };
-    Provers::build(&options, others, bounds, &[light]).expect("a sound grid").0
+    Provers::build(&options, others, bounds, &[light], &Quiet).expect("a sound grid").0
 }
 
 /// Of queries by their kind, of free flights only from a point in space, and if asked for.
@@ -103,7 +103,7 @@ fn batches_are_answered_as_single_queries() {
         let options =
             ProverOptions { method: name.parse().expect("a method"), voxel_size: 0.25, ..ProverOptions::default() };
         let shapes = [LightShape::Point(lights[0]), LightShape::Point(lights[1]), LightShape::Infinite];
-        let provers = Provers::build(&options, &[wall], bounds, &shapes).expect("a sound grid").0;
+        let provers = Provers::build(&options, &[wall], bounds, &shapes, &Quiet).expect("a sound grid").0;
         let visibility = Visibility::new(&bvh, &provers);
         let mut random = fastrand::Rng::with_seed(1);
         let queries: Vec<_> = (0..1000)
