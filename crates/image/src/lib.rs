@@ -18,6 +18,10 @@
 //! # }
 //! ```
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod error;
 mod exr;
 mod files;
@@ -32,8 +36,8 @@ mod srgb;
 
 pub use error::ImageError;
 pub use exr::{
-    AttributeValue, ComponentFormat, ExrOptions, decode_exr, read_exr, stage_exr, stage_exr_with, write_exr,
-    write_exr_with,
+    AttributeValue, Channel, ComponentFormat, Compression, ExrOptions, decode_exr, read_exr, stage_exr,
+    stage_exr_layers, stage_exr_with, write_exr, write_exr_with,
 };
 pub use files::{
     Conflict, PersistError, StagedFile, check_distinct, check_writable, remove_temporaries, same_file, shown,

@@ -14,6 +14,8 @@ pub enum AttributeValue {
     Float(f64),
     /// A whole number. EXR has 32 bits only: a larger one is written as decimal text.
     Integer(i64),
+    /// A matrix that acts on row vectors, row by row: the columns of one that acts on column vectors.
+    Matrix([f32; 16]),
 }
 
 impl From<&str> for AttributeValue {
@@ -47,6 +49,7 @@ impl From<AttributeValue> for openexr::AttributeValue {
         match value {
             AttributeValue::Text(value) => text(&value),
             AttributeValue::Float(value) => Self::F64(value),
+            AttributeValue::Matrix(value) => Self::Matrix4x4(value),
             AttributeValue::Integer(value) => i32::try_from(value).map_or_else(|_| text(&value.to_string()), Self::I32),
         }
     }

@@ -24,15 +24,59 @@ pub enum ComponentFormat {
     Half,
 }
 
+/// How the pixels of an EXR are compressed, without loss.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Compression {
+    /// Deflate, 16 rows at a time.
+    #[default]
+    Zip,
+    /// Wavelets: smaller for noisy pixels.
+    Piz,
+    /// Lengths of runs: fast.
+    Rle,
+    /// None.
+    Uncompressed,
+}
+
+impl From<Compression> for openexr::Compression {
+    fn from(compression: Compression) -> Self {
+        match compression {
+            Compression::Zip => Self::ZIP16,
+            Compression::Piz => Self::PIZ,
+            Compression::Rle => Self::RLE,
+            Compression::Uncompressed => Self::Uncompressed,
+        }
+    }
+}
+
+/// A channel beside those of the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Its name with that of its layer, such as `normal.X`.
+    pub name: String,
+    /// One value a pixel, row by row. Stored in single precision.
+    pub values: Vec<f32>,
+}
+
 /// How an EXR is written. The default keeps every bit of the pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ExrOptions {
     /// How the components of a pixel are stored.
     pub component_format: ComponentFormat,
+    /// How the pixels are compressed.
+    pub compression: Compression,
 }
 
 impl ExrOptions {
+    /// These options with another compression.
+    #[must_use]
+    pub fn with_compression(mut self, compression: Compression) -> Self {
+        self.compression = compression;
+        self
+    }
+
     /// These options with another format of the components.
     #[must_use]
     pub fn with_component_format(mut self, component_format: ComponentFormat) -> Self {
@@ -87,12 +131,28 @@ pub fn stage_exr_with(
     attributes: &[(&str, AttributeValue)],
     options: &ExrOptions,
 ) -> Result<StagedFile, ImageError> {
+    stage_exr_layers(path, image, &[], attributes, options)
+}
+
+/// As [`stage_exr_with`] with more channels, in the same part of the file. They are held a second time while it is encoded.
+///
+/// # Errors
+/// As [`write_exr`], or a channel has not one value a pixel, or its name is empty, not ASCII, or given twice.
+pub fn stage_exr_layers(
+    path: &Path,
+    image: &Image,
+    channels: &[Channel],
+    attributes: &[(&str, AttributeValue)],
+    options: &ExrOptions,
+) -> Result<StagedFile, ImageError> {
     let encode = |file: &File| {
         check_shape(image).map_err(Failure::Unencodable)?;
+        check_channels(image, channels).map_err(Failure::Unencodable)?;
         let attributes = layer_attributes(image, attributes).map_err(Failure::Unencodable)?;
         match options.component_format {
-            ComponentFormat::Float => encode(file, image, attributes, |value| value)?,
-            ComponentFormat::Half => encode(file, image, attributes, nearest_half)?,
+            _ if !channels.is_empty() => encode_layers(file, image, channels, attributes, options)?,
+            ComponentFormat::Float => encode(file, image, attributes, options, |value| value)?,
+            ComponentFormat::Half => encode(file, image, attributes, options, nearest_half)?,
         }
         Ok(sort_header(file)?)
     };
@@ -139,6 +199,10 @@ fn layer_attributes(image: &Image, attributes: &[(&str, AttributeValue)]) -> Res
         if !short || !name.bytes().all(|byte| byte.is_ascii_graphic()) {
             return Err(format!("an attribute cannot be named `{name}`"));
         }
+        if let ("worldToCamera", AttributeValue::Matrix(matrix)) = (*name, value) {
+            layer_attributes.world_to_camera = Some(*matrix);
+            continue;
+        }
         let key = openexr::Text::from_bytes_unchecked(name.bytes().collect());
         if layer_attributes.other.insert(key, value.clone().into()).is_some() {
             return Err(format!("the attribute `{name}` is given twice"));
@@ -147,11 +211,26 @@ fn layer_attributes(image: &Image, attributes: &[(&str, AttributeValue)]) -> Res
     Ok(layer_attributes)
 }
 
+/// Refuses channels that are not like the image.
+fn check_channels(image: &Image, channels: &[Channel]) -> Result<(), String> {
+    for (at, Channel { name, values }) in channels.iter().enumerate() {
+        let taken = ["R", "G", "B"].contains(&name.as_str()) || channels[..at].iter().any(|other| other.name == *name);
+        if name.is_empty() || !name.bytes().all(|byte| byte.is_ascii_graphic()) || taken {
+            return Err(format!("a channel cannot be named `{name}`"));
+        }
+        if values.len() != image.pixels.len() {
+            return Err(format!("the channel {name} has {} values for {} pixels", values.len(), image.pixels.len()));
+        }
+    }
+    Ok(())
+}
+
 /// Writes the image with the components that `component` makes of its own.
 fn encode<S: openexr::IntoSample>(
     file: &File,
     image: &Image,
     attributes: openexr::LayerAttributes,
+    options: &ExrOptions,
     component: impl Fn(f32) -> S + Sync,
 ) -> Result<(), Failure> {
     let width = image.width as usize;
@@ -159,12 +238,48 @@ fn encode<S: openexr::IntoSample>(
         let Rgb { x, y, z } = image.pixels[position.y() * width + position.x()];
         (component(x), component(y), component(z))
     });
-    let encoding = openexr::Encoding {
-        compression: openexr::Compression::ZIP16,
+    let layer = openexr::Layer::new((width, image.height as usize), attributes, encoding(options), channels);
+    openexr::Image::new(shared(image), layer).write().non_parallel().to_buffered(BufWriter::new(file))?;
+    Ok(())
+}
+
+/// Writes the image and more channels.
+fn encode_layers(
+    file: &File,
+    image: &Image,
+    channels: &[Channel],
+    attributes: openexr::LayerAttributes,
+    options: &ExrOptions,
+) -> Result<(), Failure> {
+    let component = |i: usize| {
+        let values = image.pixels.iter().map(move |pixel| pixel[i]);
+        match options.component_format {
+            ComponentFormat::Float => openexr::FlatSamples::F32(values.collect()),
+            ComponentFormat::Half => openexr::FlatSamples::F16(values.map(nearest_half).collect()),
+        }
+    };
+    let mut list: Vec<openexr::AnyChannel<openexr::FlatSamples>> =
+        ["R", "G", "B"].into_iter().enumerate().map(|(i, name)| openexr::AnyChannel::new(name, component(i))).collect();
+    list.extend(channels.iter().map(|Channel { name, values }| {
+        openexr::AnyChannel::new(name.as_str(), openexr::FlatSamples::F32(values.clone()))
+    }));
+    let channels = openexr::AnyChannels::sort(list.into());
+    let size = (image.width as usize, image.height as usize);
+    let layer = openexr::Layer::new(size, attributes, encoding(options), channels);
+    openexr::Image::new(shared(image), layer).write().non_parallel().to_buffered(BufWriter::new(file))?;
+    Ok(())
+}
+
+fn encoding(options: &ExrOptions) -> openexr::Encoding {
+    openexr::Encoding {
+        compression: options.compression.into(),
         line_order: openexr::LineOrder::Increasing,
         ..openexr::Encoding::default()
-    };
-    let layer = openexr::Layer::new((width, image.height as usize), attributes, encoding, channels);
+    }
+}
+
+/// What a file says of all of its layers.
+fn shared(image: &Image) -> openexr::ImageAttributes {
     let film = openexr::Vec2(image.full_size[0] as usize, image.full_size[1] as usize);
     let mut shared = openexr::ImageAttributes::new(openexr::IntegerBounds::new(openexr::Vec2(0, 0), film));
     // Readers assume these primaries where a file says nothing, but should not have to.
@@ -174,8 +289,7 @@ fn encode<S: openexr::IntoSample>(
         blue: openexr::Vec2(0.15, 0.06),
         white: openexr::Vec2(0.3127, 0.329),
     });
-    openexr::Image::new(shared, layer).write().non_parallel().to_buffered(BufWriter::new(file))?;
-    Ok(())
+    shared
 }
 
 #[cfg(test)]
@@ -185,6 +299,7 @@ mod tests {
     use super::*;
     use crate::{Rgb, read_exr};
     use exr::meta::MetaData;
+    use openexr::{ReadChannels as _, ReadLayers as _};
 
     fn gradient() -> Image {
         let mut image = Image::cropped([40, 30], [5, 7], [7, 20]);
@@ -279,6 +394,47 @@ mod tests {
             // Half a unit in the last place of 11 bits; 1e-30 is below the smallest half float.
             assert!((pixel.x - read.x).abs() <= pixel.x / 2048.0 && read.z == 0.0, "{pixel} {read}");
         }
+    }
+
+    #[test]
+    fn layers_are_channels_of_the_same_part() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("layers.exr");
+        let image = gradient();
+        let values: Vec<f32> = (0..image.pixels.len()).map(|i| 1.0 / (i as f32 + 3.0)).collect();
+        let channel = |name: &str| Channel { name: name.to_owned(), values: values.clone() };
+        let channels = [channel("normal.X"), channel("albedo.R"), channel("depth.Z")];
+        let write = |channels: &[Channel], options: &ExrOptions| {
+            let camera = std::array::from_fn(|i| i as f32);
+            let attributes = [("worldToCamera", AttributeValue::Matrix(camera))];
+            stage_exr_layers(&path, &image, channels, &attributes, options).map(|file| file.persist().unwrap())
+        };
+        for compression in [Compression::Zip, Compression::Piz, Compression::Rle, Compression::Uncompressed] {
+            for format in [ComponentFormat::Float, ComponentFormat::Half] {
+                let options = ExrOptions::default().with_compression(compression).with_component_format(format);
+                write(&channels, &options).unwrap();
+                let bytes = std::fs::read(&path).unwrap();
+                let header = header(&bytes);
+                assert_eq!(header.compression, compression.into());
+                assert_eq!(header.own_attributes.world_to_camera.unwrap()[7], 7.0);
+                let names: Vec<String> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
+                assert_eq!(names, ["B", "G", "R", "albedo.R", "depth.Z", "normal.X"]);
+                // The picture is what it is without layers; the layers keep every bit.
+                let read = read_exr(&path).unwrap();
+                write(&[], &options).unwrap();
+                assert_eq!(read.pixels[4..], read_exr(&path).unwrap().pixels[4..]);
+                let all = openexr::read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+                let all = all.all_attributes().from_buffered(Cursor::new(bytes)).unwrap();
+                let depth = &all.layer_data.channel_data.list[4].sample_data;
+                assert_eq!(*depth, openexr::FlatSamples::F32(values.clone()));
+            }
+        }
+        for wrong in ["", "R", "a b", "albedo.R"] {
+            let with = [&channels[..], &[channel(wrong)]].concat();
+            assert!(write(&with, &ExrOptions::default()).is_err(), "{wrong}");
+        }
+        let short = Channel { name: "a".to_owned(), values: vec![1.0] };
+        assert!(write(&[short], &ExrOptions::default()).is_err());
     }
 
     #[cfg(unix)]
