@@ -5,7 +5,8 @@ mod common;
 use common::{Options, all_methods, builtin, options, rendered};
 use vdf::{
     render::{
-        Estimator, Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions, SamplerKind, TransmittanceEstimator,
+        Estimator, FilmPart, Integrator, LiveFilm, PrepareOptions, PreparedScene, Quiet, RenderOptions, SamplerKind,
+        TransmittanceEstimator,
     },
     scene::{PixelRect, Rgb, Scene},
     visibility::Method,
@@ -165,7 +166,11 @@ fn an_image_is_the_sum_of_its_parts() {
     for sampler in SamplerKind::ALL {
         let o = RenderOptions { spp: Some(11), sampler, ..RenderOptions::default() };
         let whole = prepared.render(&o, &Quiet).expect("usable options").image;
-        let part = |samples| prepared.render_samples(&o, samples, &Quiet).expect("usable options");
+        let part = |samples| {
+            let film = LiveFilm::new(prepared.film(&o, "box").expect("usable options"));
+            prepared.render_part(&o, &film, &FilmPart::samples(samples), &Quiet).expect("usable options");
+            film.into_film()
+        };
         let mut film = part(3..8);
         film.merge(part(8..11)).expect("the same render");
         film.merge(part(0..3)).expect("the same render");

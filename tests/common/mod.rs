@@ -74,6 +74,7 @@ pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
         threads,
         crop,
         segment_first,
+        ..RenderOptions::default()
     };
     PreparedScene::new(scene.clone(), &prepare, &Quiet)?.render(&options, &Quiet)
 }

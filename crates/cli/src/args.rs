@@ -1,6 +1,8 @@
 //! The command line as typed.
 
 mod convergence;
+mod long;
+mod picture;
 mod report;
 
 use std::{path::PathBuf, str::FromStr};
@@ -10,11 +12,13 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
 use vdf_image::metrics::PIXELS_PER_DEGREE;
-use vdf_render::{GridExtent, Integrator};
+use vdf_render::{GridExtent, Integrator, Layer};
 use vdf_scene::PixelRect;
 use vdf_visibility::{Method, UnknownMethod};
 
 pub(crate) use convergence::ReportConvergenceArgs;
+pub(crate) use long::{FrameRange, LongArgs, MergeArgs, ProgressName};
+pub(crate) use picture::PictureArgs;
 pub(crate) use report::{
     ReportArgs, ReportCommand, ReportFiles, ReportQueriesArgs, ReportScalingArgs, ReportThesisArgs,
 };
@@ -30,6 +34,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Render(RenderArgs),
+    Merge(MergeArgs),
     Scene(SceneArgs),
     Verify(VerifyArgs),
     Voxelize(VoxelizeArgs),
@@ -38,13 +43,15 @@ pub(crate) enum Command {
 }
 
 /// Render a scene to an EXR and a PNG.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:
   vdf render                                       the built-in scene cbox_vol2
   vdf render --method amr-sn --voxel 8 -o fog.exr  with a method and a voxel size
   vdf render scene.xml -D spp=64 --stats fog.json  a Mitsuba 3 scene with a parameter
   vdf render cbox_vol4 --integrator raymarch --samples-per-segment 49 --spp 4
   vdf render --record-queries fog.vdfq             also records visibility queries, to replay them
+  vdf render --spp 4096 --checkpoint fog.film --resume   may be killed and run again; SIGUSR1 shows the picture so far
+  vdf render --shard 3/8 -o 3.film                 an eighth of the samples, for vdf merge
 
 Exit codes: 0 done, 1 failure while rendering or writing, 2 usage or scene error, 130 interrupted.")]
 pub(crate) struct RenderArgs {
@@ -106,6 +113,9 @@ pub(crate) struct RenderArgs {
     /// Render only these pixels of the full image (x1 and y1 are one past the last)
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = parse_crop)]
     pub(crate) crop: Option<PixelRect>,
+    /// Layers to write into the EXR beside the picture, separated by commas: albedo, normal, depth, position, variance, samples, cost, unknown
+    #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
+    pub(crate) aov: Vec<Layer>,
     /// Write the statistics as JSON
     #[arg(long, value_name = "FILE.json")]
     pub(crate) stats: Option<PathBuf>,
@@ -119,6 +129,10 @@ pub(crate) struct RenderArgs {
     /// No progress and no statistics in words; errors and warnings only
     #[arg(short, long)]
     pub(crate) quiet: bool,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+    #[command(flatten)]
+    pub(crate) long: LongArgs,
 }
 
 /// The side of a light buffer's faces as typed.

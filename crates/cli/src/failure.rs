@@ -4,9 +4,11 @@ use std::{
     fmt,
     io::{self, Write as _},
     process::ExitCode,
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 use anyhow::anyhow;
+use serde::Serialize;
 use vdf_image::ImageError;
 use vdf_lab::LabError;
 use vdf_render::RenderError;
@@ -23,6 +25,10 @@ pub(crate) enum Failure {
     Work(anyhow::Error),
     /// The user interrupted: exit code 130.
     Interrupted,
+    /// The user interrupted, and what was done is kept, as this message says: exit code 130.
+    Stopped(String),
+    /// What was asked for is done, but the render is not complete: exit code 3.
+    Incomplete(String),
     /// The user interrupted after some of the files had been written: exit code 130.
     InterruptedAfter {
         /// Files that were written, each of them whole.
@@ -34,33 +40,73 @@ impl Failure {
     /// Prints the message and returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         match self {
-            Self::Usage(e) => {
-                say(format_args!("error: {e:#}"));
-                ExitCode::from(2)
-            }
             // Whoever reads our output stopped reading: nothing is left to say, and nobody to say it to.
-            Self::Work(e) if e.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe) => {
-                ExitCode::from(1)
-            }
-            Self::Work(e) => {
-                say(format_args!("error: {e:#}"));
-                ExitCode::from(1)
-            }
-            Self::InterruptedAfter { written } if *written > 0 => {
-                say(format_args!("interrupted; {written} files were written, each of them whole"));
-                ExitCode::from(130)
-            }
-            Self::Interrupted | Self::InterruptedAfter { .. } => {
-                say(format_args!("interrupted; nothing was written"));
-                ExitCode::from(130)
+            Self::Work(e) if e.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::BrokenPipe) => {}
+            Self::Work(_) | Self::Usage(_) | Self::Incomplete(_) => say(format_args!("error: {}", self.message())),
+            Self::Stopped(_) | Self::Interrupted | Self::InterruptedAfter { .. } => {
+                say(format_args!("{}", self.message()));
             }
         }
+        say_end(self.code());
+        ExitCode::from(self.code())
+    }
+
+    const fn code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Work(_) => 1,
+            Self::Incomplete(_) => 3,
+            Self::Stopped(_) | Self::Interrupted | Self::InterruptedAfter { .. } => 130,
+        }
+    }
+
+    /// What there is to say.
+    pub(crate) fn message(&self) -> String {
+        match self {
+            Self::Usage(e) | Self::Work(e) => format!("{e:#}"),
+            Self::Stopped(message) | Self::Incomplete(message) => message.clone(),
+            Self::InterruptedAfter { written } if *written > 0 => {
+                format!("interrupted; {written} files were written, each of them whole")
+            }
+            Self::Interrupted | Self::InterruptedAfter { .. } => "interrupted; nothing was written".to_owned(),
+        }
+    }
+}
+
+/// Whether stderr is read by a program.
+static JSON: AtomicBool = AtomicBool::new(false);
+
+/// From now on what is said on stderr is one JSON object a line.
+pub(crate) fn speak_json() {
+    JSON.store(true, Ordering::Relaxed);
+}
+
+/// The last line for a program that reads stderr.
+pub(crate) fn say_end(code: u8) {
+    if JSON.load(Ordering::Relaxed) {
+        say_object(&serde_json::json!({ "event": "end", "code": code }));
     }
 }
 
 /// A line on stderr. Unlike `eprintln!` it does not panic if nobody can read it.
 pub(crate) fn say(line: fmt::Arguments<'_>) {
-    let _ = writeln!(io::stderr(), "{line}");
+    if JSON.load(Ordering::Relaxed) {
+        let line = line.to_string();
+        let kinds = ["error", "warning", "note"];
+        let of_kind = kinds.iter().find_map(|kind| Some((*kind, line.strip_prefix(kind)?.strip_prefix(": ")?)));
+        let (event, message) = of_kind.unwrap_or(("note", &line));
+        say_object(&serde_json::json!({ "event": event, "message": message }));
+    } else {
+        let _ = writeln!(io::stderr(), "{line}");
+    }
+}
+
+/// An object in one line on stderr.
+pub(crate) fn say_object(object: &impl Serialize) {
+    if let Ok(line) = serde_json::to_string(object) {
+        // In one piece, so that no other thread's line gets between.
+        let _ = io::stderr().write_all(format!("{line}\n").as_bytes());
+    }
 }
 
 impl From<RenderError> for Failure {

@@ -1,7 +1,7 @@
 //! The `vdf` binary: command-line definitions and glue. Everything else is in the libraries.
 //!
 //! Results go to stdout, talk goes to stderr. Exit codes: 0 done, 1 failure while rendering or writing, 2 usage or scene error,
-//! 130 interrupted.
+//! 3 samples are missing, 130 interrupted.
 
 mod args;
 mod commands;
@@ -14,7 +14,7 @@ use clap::Parser as _;
 
 use crate::{
     args::{Arguments, Command},
-    failure::Failure,
+    failure::{Failure, say_end},
 };
 
 fn main() -> ExitCode {
@@ -28,7 +28,10 @@ fn main() -> ExitCode {
         }
     };
     match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => {
+            say_end(0);
+            ExitCode::SUCCESS
+        }
         Err(failure) => failure.report(),
     }
 }
@@ -46,6 +49,7 @@ fn survive_limits() {
 fn run(arguments: &Arguments) -> Result<(), Failure> {
     match &arguments.command {
         Command::Render(a) => commands::render::run(a),
+        Command::Merge(a) => commands::merge::run(a),
         Command::Scene(a) => commands::scene::run(&a.command),
         Command::Verify(a) => commands::verify::run(a),
         Command::Voxelize(a) => commands::voxelize::run(a),

@@ -18,6 +18,9 @@ pub enum RenderError {
     /// There is no memory for the film.
     #[error(transparent)]
     Film(#[from] vdf_image::ImageError),
+    /// The film lacks samples that it should have.
+    #[error(transparent)]
+    Incomplete(#[from] crate::FilmError),
     /// The threads could not be started.
     #[error("cannot start the rendering threads: {message}")]
     Threads {

@@ -7,11 +7,9 @@ use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
 use crate::{
     Camera, FilterSample, Integrator, PixelFilter, PreparedScene, Progress, RenderOptions, Sampler, SamplerKind,
+    film::{Feature, tile_rects},
     integrator::Tracer,
 };
-
-/// Side of a tile in pixels. Only progress sees tiles.
-const TILE: u32 = 16;
 
 /// What to render, with all options resolved.
 #[derive(Clone, Debug)]
@@ -86,12 +84,7 @@ impl<'a> Job<'a> {
     /// The tiles, row by row.
     #[must_use]
     pub fn tiles(&self) -> Vec<PixelRect> {
-        let PixelRect { x0, y0, x1, y1 } = self.crop;
-        (y0..y1)
-            .step_by(TILE as usize)
-            .flat_map(|y| (x0..x1).step_by(TILE as usize).map(move |x| (x, y)))
-            .map(|(x, y)| PixelRect { x0: x, y0: y, x1: (x + TILE).min(x1), y1: (y + TILE).min(y1) })
-            .collect()
+        tile_rects(self.crop).collect()
     }
 
     /// Who follows the paths, asking the scene's own provers. A path that goes on and on asks `progress` whether to stop; then its radiance
@@ -138,6 +131,18 @@ impl<R> std::fmt::Debug for PathTracer<'_, R> {
 }
 
 impl<R: Recorder> PathTracer<'_, R> {
+    /// What the camera ray of a sample meets first.
+    pub(crate) fn feature(&self, x: u32, y: u32, sample: u32) -> Option<Feature> {
+        let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
+        let FilterSample { offset: [dx, dy], .. } = self.filter.sample(&mut sampler);
+        let world = self.tracer.world;
+        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
+        let ray = self.tracer.camera_ray(self.camera.position(), segment, direction);
+        let surface = world.surface_point(&world.bvh.intersect(&ray.segment)?, direction);
+        let depth = surface.point.distance(self.camera.position());
+        Some(Feature { albedo: surface.reflectance, normal: surface.normal, position: surface.point, depth })
+    }
+
     /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.
     #[inline]
     pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> (Rgb, f64) {

@@ -24,6 +24,10 @@
 //! # }
 //! ```
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod bsdf;
 mod camera;
 #[cfg(test)]
@@ -47,7 +51,9 @@ mod world;
 
 pub use camera::Camera;
 pub use error::RenderError;
-pub use film::{Film, FilmError, FilmOrigin};
+pub use film::{
+    Film, FilmError, FilmFileError, FilmOrigin, FilmRun, Layer, Layers, MissingSamples, Picture, UnknownLayer,
+};
 pub use filter::{FilterSample, PixelFilter};
 pub use integrator::{Integrator, UnknownIntegrator};
 pub use job::{Job, PathTracer};
@@ -58,9 +64,9 @@ pub use options::{
 };
 pub use phase::PhaseFunction;
 pub use prepared::{PreparedScene, default_voxel_size};
-pub use render::Rendering;
+pub use render::{FilmPart, LiveFilm, Rendering};
 pub use sampler::{Sampler, SamplerKind};
 pub use statistics::{NeighbourhoodSize, PartSize, Statistics};
-pub use threads::{check_threads, on_threads};
+pub use threads::{check_threads, on_threads, thread_count};
 pub use vdf_visibility::{Progress, Quiet};
 pub use world::{SurfacePoint, World, light_shapes};

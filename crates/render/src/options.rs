@@ -3,7 +3,7 @@
 use vdf_scene::{PixelRect, Scene};
 use vdf_visibility::Method;
 
-use crate::{Integrator, RenderError, SamplerKind, threads::check_threads};
+use crate::{Integrator, Layers, RenderError, SamplerKind, threads::check_threads};
 
 /// The estimator of transmittance towards emitters; both have the same mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -174,6 +174,8 @@ pub struct RenderOptions {
     /// Whether `volpath` asks for a proof of each free flight before it casts a ray (Sec. 2.4 in \[Houska2013\]). The image is the same
     /// either way; it has seldom paid (`docs/performance.md`).
     pub segment_first: bool,
+    /// What is kept beside the picture. Layers of surfaces cost one more ray a sample.
+    pub layers: Layers,
 }
 
 impl RenderOptions {

@@ -1,16 +1,17 @@
 //! A scene made ready to be rendered: its world, its hierarchy and the provers of a method, which belong together.
 
-use std::{ops::Range, sync::Arc, time::Instant};
+use std::{sync::Arc, time::Instant};
 
 use vdf_geometry::Bounds;
 use vdf_scene::Scene;
 use vdf_visibility::{BuildReport, Method, ProverOptions, Provers, Visibility, VisibilityError};
 
 use crate::{
-    Film, PrepareOptions, Progress, RenderError, RenderOptions, Rendering, World,
+    Film, FilmPart, FilmRun, LiveFilm, PrepareOptions, Progress, RenderError, RenderOptions, Rendering, Statistics,
+    World,
     job::Job,
     light_shapes,
-    render::{render, render_film},
+    render::{add_part, empty_film, render},
     threads::on_threads,
 };
 
@@ -111,22 +112,57 @@ impl PreparedScene {
         on_threads(options.threads, || render(&job, progress))
     }
 
-    /// Renders the samples `samples` of every pixel, of whatever number, to a film that can be merged with those of other samples.
-    /// Once all are there the image has the bytes that [`PreparedScene::render`] gives it.
+    /// A film without samples for a render of these options, to be rendered to by [`PreparedScene::render_part`]. `name` is the scene's, for
+    /// those who will see the picture.
     ///
     /// # Errors
-    /// If an option is not usable or there is no sample, or `progress` asks to stop.
-    pub fn render_samples(
+    /// If an option is not usable, or there is no memory for the film.
+    pub fn film(&self, options: &RenderOptions, name: &str) -> Result<Film, RenderError> {
+        empty_film(&self.job(options)?, name)
+    }
+
+    /// Renders what `film` lacks of a part of its samples, of whatever size: films can be merged, and once all samples are there the image has
+    /// the bytes that [`PreparedScene::render`] gives it. Tells `progress` what is done of it, but not how much there is.
+    ///
+    /// If it is stopped, the film keeps the tiles that are done.
+    ///
+    /// # Errors
+    /// If an option is not usable, the film is of another render, or `progress` asks to stop.
+    pub fn render_part(
         &self,
         options: &RenderOptions,
-        samples: Range<u32>,
+        film: &LiveFilm,
+        part: &FilmPart,
         progress: &dyn Progress,
-    ) -> Result<Film, RenderError> {
-        if samples.is_empty() {
-            return Err(RenderError::option("samples", "must be at least one"));
-        }
+    ) -> Result<(), RenderError> {
         let job = self.job(options)?;
-        on_threads(options.threads, || Ok(render_film(&job, samples, progress)?.0))
+        empty_film(&job, "")?.origin().check_same_samples(film.snapshot().origin())?;
+        on_threads(options.threads, || add_part(&job, film, part, progress))
+    }
+
+    /// The figures of a film of `spp` whole samples per pixel, and of the last run that worked at it.
+    ///
+    /// # Errors
+    /// If an option is not usable.
+    pub fn statistics(&self, options: &RenderOptions, film: &Film, spp: u32) -> Result<Statistics, RenderError> {
+        let job = self.job(options)?;
+        let seconds = film.runs().iter().map(|run| run.t_render).sum();
+        on_threads(options.threads, || Ok(Statistics::new(&job, film.counters(), spp, seconds)))
+    }
+
+    /// What a film is to remember of a run that has rendered for `t_render` seconds and made `paths` paths.
+    #[must_use]
+    pub fn run(&self, machine: &str, threads: usize, paths: u64, t_render: f64) -> FilmRun {
+        FilmRun {
+            machine: machine.to_owned(),
+            method: self.method.name().to_owned(),
+            voxel_size: self.build.resolution.map(|_| self.build.voxel_size),
+            threads,
+            paths,
+            t_hierarchy: self.t_hierarchy,
+            t_build: self.build.seconds(),
+            t_render,
+        }
     }
 
     /// The render of these options, to be followed path by path.

@@ -128,7 +128,7 @@ fn ratio(a: u64, b: u64) -> Option<f64> {
 }
 
 impl Statistics {
-    pub(crate) fn new(job: &Job<'_>, counters: &Counters, t_render: f64) -> Self {
+    pub(crate) fn new(job: &Job<'_>, counters: &Counters, spp: u32, t_render: f64) -> Self {
         let (prepared, options) = (job.prepared(), job.options());
         let build = prepared.build_report();
         let free = build.voxels - build.occupied;
@@ -153,7 +153,7 @@ impl Statistics {
             estimator: options.estimator.name(),
             sampler: options.sampler.name(),
             size: job.size(),
-            spp: job.spp(),
+            spp,
             seed: job.seed(),
             threads: rayon::current_num_threads(),
             triangles: prepared.world().triangles.len(),

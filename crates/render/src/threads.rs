@@ -21,6 +21,18 @@ pub fn check_threads(threads: Option<usize>) -> Result<(), RenderError> {
     }
 }
 
+/// How many threads [`on_threads`] takes.
+///
+/// # Errors
+/// [`RenderError::Option`] or [`RenderError::Threads`] if there cannot be so many threads.
+pub fn thread_count(threads: Option<usize>) -> Result<usize, RenderError> {
+    check_threads(threads)?;
+    match threads {
+        Some(threads) => Ok(threads),
+        None => Ok(from_environment()?.unwrap_or_else(processors)),
+    }
+}
+
 /// Runs `work` on a pool of that many threads; by default as many as the environment variable `RAYON_NUM_THREADS` says, or else one for each
 /// processor.
 ///
@@ -30,11 +42,7 @@ pub fn on_threads<T: Send, E: From<RenderError> + Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> Result<T, E> + Send,
 ) -> Result<T, E> {
-    check_threads(threads)?;
-    let threads = match threads {
-        Some(threads) => threads,
-        None => from_environment()?.unwrap_or_else(processors),
-    };
+    let threads = thread_count(threads)?;
     check_memory(threads)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK).build();
     pool.map_err(|e| RenderError::Threads { message: e.to_string() })?.install(work)

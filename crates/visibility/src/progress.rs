@@ -4,7 +4,7 @@
 pub trait Progress: Sync {
     /// A new phase of the work begins, named by what is done or made in it.
     fn phase(&self, name: &str);
-    /// How much there is to do in the phase: planes of a field, lights, pixels of a render, segments of a verification.
+    /// How much there is to do in the phase: planes of a field, lights, samples of all pixels of a render, segments of a verification.
     fn work_total(&self, n: u64);
     /// `n` more of these are done.
     fn work_done(&self, n: u64);

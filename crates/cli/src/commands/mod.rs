@@ -1,6 +1,7 @@
 //! One file a subcommand.
 
 pub(crate) mod compare;
+pub(crate) mod merge;
 pub(crate) mod render;
 pub(crate) mod report;
 pub(crate) mod scene;

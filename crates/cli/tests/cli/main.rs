@@ -4,6 +4,7 @@
 mod bad_input;
 mod compare;
 mod convergence;
+mod long;
 mod outputs;
 mod render;
 mod report;

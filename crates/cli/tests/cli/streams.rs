@@ -178,3 +178,99 @@ fn a_comparison_needs_no_threads_but_its_own() {
     Outcome::new(&["compare"], &output)
         .failed(1, &["cannot start the rendering threads: RAYON_NUM_THREADS must be at most 4096"]);
 }
+
+/// A render of some seconds that keeps its samples, and the same without interruption.
+const LONG: [&str; 7] = ["render", "-D", "width=48", "-D", "height=32", "--reproducible", "-q"];
+
+fn spawn(sandbox: &Sandbox, args: &[&str]) -> Child {
+    sandbox.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn signal(child: &Child, name: &str) {
+    assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
+}
+
+fn wait_for(mut what: impl FnMut() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !what() {
+        assert!(Instant::now() < deadline, "it does not come");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// However often and at whatever moment it is killed, it ends with the bytes of an uninterrupted render.
+#[test]
+fn a_render_that_is_killed_again_and_again_is_the_same() {
+    let sandbox = Sandbox::new();
+    sandbox.run(&[&LONG[..], &["--spp", "300", "-o", "whole.exr"]].concat()).succeeded();
+    let kept = ["--spp", "300", "-o", "a.exr", "--checkpoint", "a.film", "--every", "50ms", "--resume"];
+    let kept = [&LONG[..], &kept].concat();
+    let film = sandbox.path().join("a.film");
+    let modified = || film.metadata().and_then(|m| m.modified()).ok();
+    let mut killed = 0;
+    for kill in 0..6 {
+        let (before, mut child) = (modified(), spawn(&sandbox, &kept));
+        wait_for(|| modified() != before || child.try_wait().unwrap().is_some());
+        thread::sleep(Duration::from_millis(7 * kill));
+        killed += u32::from(child.try_wait().unwrap().is_none());
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert!(killed >= 2, "it was done before it was killed {killed} times");
+    // The checkpoint at hand may have left its temporary file, but nothing else.
+    sandbox.run(&kept).succeeded();
+    for extension in ["exr", "png"] {
+        let [a, b] = ["whole", "a"].map(|name| sandbox.read(&format!("{name}.{extension}")));
+        assert!(a == b, "{extension}");
+    }
+}
+
+#[test]
+fn an_interrupt_writes_a_last_checkpoint() {
+    for name in ["-INT", "-TERM"] {
+        let sandbox = Sandbox::new();
+        let kept = ["--spp", "100000000", "--checkpoint", "a.film", "--every", "1h", "-o", "a.exr"];
+        let kept = [&LONG[..], &kept].concat();
+        let child = spawn(&sandbox, &kept);
+        wait_for(|| ticks(&child) > 20);
+        signal(&child, name);
+        let outcome = Outcome::new(&kept, &child.wait_with_output().unwrap());
+        assert_eq!(outcome.code, Some(130), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("samples are kept in a.film; go on with --resume"), "{}", outcome.stderr);
+        assert_eq!(sandbox.files(), ["a.film"]);
+    }
+}
+
+#[test]
+fn a_signal_shows_the_picture_so_far() {
+    let sandbox = Sandbox::new();
+    let endless = ["render", "-D", "width=48", "-D", "height=32", "--spp", "100000000", "-o", "a.exr"];
+    let child = spawn(&sandbox, &endless);
+    wait_for(|| ticks(&child) > 20);
+    signal(&child, "-USR1");
+    // The EXR comes last.
+    wait_for(|| sandbox.files().contains(&"a.partial.exr".to_owned()));
+    signal(&child, "-INT");
+    let outcome = Outcome::new(&endless, &child.wait_with_output().unwrap());
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(130), "interrupted; nothing was written\n"));
+    assert_eq!(sandbox.files(), ["a.partial.exr", "a.partial.png"]);
+    sandbox.run(&["compare", "a.partial.exr", "a.partial.exr"]).succeeded();
+}
+
+/// As on a full disk: the older checkpoint stays, and can be gone on with.
+#[test]
+fn a_checkpoint_that_does_not_fit_leaves_the_older_one() {
+    let sandbox = Sandbox::new();
+    let size = "render -D width=64 -D height=64 --method none -q --checkpoint a.film --resume --every 1ms";
+    let limited = |blocks: u32, args: &str| {
+        let script = format!("ulimit -f {blocks}; exec '{}' {size} {args}", env!("CARGO_BIN_EXE_vdf"));
+        let output = Command::new("sh").args(["-c", &script]).current_dir(sandbox.path()).output().unwrap();
+        Outcome::new(&["sh", "-c", &script], &output)
+    };
+    limited(1000, "--spp 1 -o a.exr").succeeded();
+    let good = sandbox.read("a.film");
+    limited(8, "--spp 100000000 -o b.exr").failed(1, &["cannot write a.film: File too large"]);
+    assert_eq!(sandbox.read("a.film"), good);
+    assert_eq!(sandbox.files(), ["a.exr", "a.film", "a.png"]);
+    limited(1000, "--spp 2 -o b.exr").succeeded();
+}

@@ -5,96 +5,51 @@
 //! that make up its samples, from the first to the last.
 //!
 //! *Guarantee.* The image has the same bytes however the samples are divided between threads, passes or machines: every division consists of
-//! blocks of the same tree.
+//! blocks of the same tree. Tiles are independent, so that one film may have more samples in some than in others: a checkpoint between two
+//! tiles, or a machine's share of the tiles.
 //!
-//! *Cost.* A render that is not divided keeps a stack of at most 33 sums for the pixel at hand. A [`Film`] keeps 24 bytes a pixel for each
-//! of its blocks, of which there are at most two for each power of two in the number of samples.
+//! *Cost.* 8 bytes for each sum of a pixel (three without layers) and each of its blocks, of which there are at most two for each power of two
+//! in the number of samples, and one after 2ᵏ samples. A copy shares all sums with its original.
 
-use std::ops::Range;
+mod blocks;
+mod file;
+mod layers;
+mod origin;
 
-use glam::DVec3;
-use smallvec::SmallVec;
-use vdf_image::Image;
-use vdf_scene::PixelRect;
+use std::{ops::Range, sync::Arc};
 
-use crate::Integrator;
+use vdf_image::{Channel, Image};
+use vdf_scene::{PixelRect, Rgb};
+use vdf_visibility::Counters;
 
-/// A block of samples: those with the numbers index·2^level to (index + 1)·2^level − 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct BlockId {
-    level: u32,
-    index: u32,
-}
+use self::blocks::BlockId;
+pub(crate) use self::blocks::PixelSum;
+pub(crate) use self::layers::{Feature, LayerSums};
+pub use self::{
+    file::FilmFileError,
+    layers::{Layer, Layers, UnknownLayer},
+    origin::{FilmOrigin, FilmRun, Picture},
+};
+use crate::{FilmPart, RenderError};
 
-impl BlockId {
-    const fn samples(self) -> Range<u64> {
-        let size = 1_u64 << self.level;
-        self.index as u64 * size..(self.index as u64 + 1) * size
-    }
-
-    /// The block that has this one as its left half, and the other as its right half.
-    fn parent_with(self, right: Self) -> Option<Self> {
-        let buddies = self.level == right.level && self.index.is_multiple_of(2) && right.index == self.index + 1;
-        buddies.then_some(Self { level: self.level + 1, index: self.index / 2 })
-    }
-}
-
-/// The sum of consecutive samples of one pixel, in the order of the tree.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct PixelSum {
-    blocks: SmallVec<[(BlockId, DVec3); 8]>,
-}
-
-impl PixelSum {
-    /// Adds sample number `sample`, the one after that added before.
-    #[inline]
-    pub(crate) fn add(&mut self, sample: u32, value: DVec3) {
-        let (mut id, mut sum) = (BlockId { level: 0, index: sample }, value);
-        while let Some(&(left, left_sum)) = self.blocks.last()
-            && let Some(parent) = left.parent_with(id)
-        {
-            (id, sum) = (parent, left_sum + sum);
-            self.blocks.pop();
-        }
-        self.blocks.push((id, sum));
-    }
-
-    /// The sum of all.
-    #[inline]
-    pub(crate) fn total(&self) -> DVec3 {
-        self.blocks.iter().fold(DVec3::ZERO, |total, (_, sum)| total + *sum)
-    }
-}
-
-/// What the samples of a film are samples of: films that differ in it cannot be merged.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FilmOrigin {
-    /// [`vdf_scene::Scene::checksum`].
-    pub scene: u32,
-    /// Integrator of the render.
-    pub integrator: Integrator,
-    /// Name of the estimator of transmittance.
-    pub transmittance: &'static str,
-    /// Name of the roulette.
-    pub roulette: &'static str,
-    /// Name of the estimator of light.
-    pub estimator: &'static str,
-    /// How the samples of a pixel are spread.
-    pub sampler: &'static str,
-    /// Seed of the render.
-    pub seed: u64,
-    /// Width and height of the full film in pixels.
-    pub full_size: [u32; 2],
-    /// The pixels.
-    pub crop: PixelRect,
-}
+/// Side of a tile in pixels.
+pub(crate) const TILE: u32 = 16;
 
 /// Sums of some samples of every pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     origin: FilmOrigin,
-    /// In the order of their samples.
-    blocks: Vec<(BlockId, Vec<DVec3>)>,
+    picture: Picture,
+    /// Row by row.
+    tiles: Vec<FilmTile>,
+    counters: Counters,
+    runs: Vec<FilmRun>,
+}
+
+/// The sums of one tile: for each block those of all pixels, row by row, one after the other for each pixel. In the order of the samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct FilmTile {
+    blocks: Vec<(BlockId, Arc<[f64]>)>,
 }
 
 /// Why two films cannot be merged, or a film is not complete.
@@ -102,49 +57,61 @@ pub struct Film {
 #[non_exhaustive]
 pub enum FilmError {
     /// They are of different renders.
-    #[error("the films are of different renders: {field} differs")]
+    #[error("the films are of different renders: {field} differs, {one} and {other}")]
     Stranger {
         /// What differs.
         field: &'static str,
+        /// Its value in the one film.
+        one: String,
+        /// Its value in the other.
+        other: String,
     },
-    /// Both have these samples.
-    #[error("both films have the samples {} to {}", samples.start, samples.end - 1)]
+    /// Both have some of these samples.
+    #[error("both films have the samples {} to {} of {tiles} tiles", samples.start, samples.end - 1)]
     Overlap {
-        /// The samples.
+        /// The samples that both have in the first such tile.
         samples: Range<u64>,
+        /// In how many tiles there are such samples.
+        tiles: usize,
     },
-    /// There are no samples before these, or none at all.
-    #[error("the film lacks the samples from {from}")]
+    /// Some samples are missing.
+    #[error("the film lacks {}", missing.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and "))]
     Missing {
-        /// The first that is missing.
-        from: u64,
+        /// Which, with one entry for each range.
+        missing: Vec<MissingSamples>,
+    },
+    /// There is no memory for the image.
+    #[error("an image of {} x {} pixels does not fit into memory", size[0], size[1])]
+    Memory {
+        /// Width and height in pixels.
+        size: [u32; 2],
     },
 }
 
-impl Film {
-    pub(crate) const fn new(origin: FilmOrigin) -> Self {
-        Self { origin, blocks: Vec::new() }
-    }
+/// Samples that some tiles lack.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MissingSamples {
+    /// Their numbers.
+    pub samples: Range<u64>,
+    /// How many tiles lack them.
+    pub tiles: usize,
+    /// Of how many.
+    pub of: usize,
+}
 
-    /// Sets the sums of pixel number `pixel`, all of which must have the same blocks.
-    pub(crate) fn set(&mut self, pixel: usize, pixels: usize, sum: &PixelSum) {
-        if self.blocks.is_empty() {
-            self.blocks = sum.blocks.iter().map(|(id, _)| (*id, vec![DVec3::ZERO; pixels])).collect();
+impl std::fmt::Display for MissingSamples {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.samples.start, self.samples.end - 1) {
+            (first, last) if first == last => write!(f, "sample {first}")?,
+            (first, last) => write!(f, "samples {first} to {last}")?,
         }
-        for ((_, sums), (_, sum)) in self.blocks.iter_mut().zip(&sum.blocks) {
-            sums[pixel] = *sum;
-        }
+        if self.tiles < self.of { write!(f, " of {} of {} tiles", self.tiles, self.of) } else { Ok(()) }
     }
+}
 
-    /// What the samples are samples of.
-    #[must_use]
-    pub const fn origin(&self) -> &FilmOrigin {
-        &self.origin
-    }
-
-    /// The ranges of samples that every pixel has, in order; ranges that follow each other are one.
-    #[must_use]
-    pub fn samples(&self) -> Vec<Range<u64>> {
+impl FilmTile {
+    /// The ranges of samples, in order; ranges that follow each other are one.
+    fn samples(&self) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         for (id, _) in &self.blocks {
             let samples = id.samples();
@@ -156,50 +123,39 @@ impl Film {
         ranges
     }
 
-    /// Adds the samples of `other`. The result does not depend on the order in which films are merged.
-    ///
-    /// # Errors
-    /// If the films are of different renders or have a sample in common; then this film is unchanged.
-    pub fn merge(&mut self, other: Self) -> Result<(), FilmError> {
-        let (a, b) = (&self.origin, &other.origin);
-        let differs = [
-            ("the scene", a.scene != b.scene),
-            ("the integrator", a.integrator != b.integrator),
-            ("the estimator of transmittance", a.transmittance != b.transmittance),
-            ("the roulette", a.roulette != b.roulette),
-            ("the estimator of light", a.estimator != b.estimator),
-            ("the sampler", a.sampler != b.sampler),
-            ("the seed", a.seed != b.seed),
-            ("the size of the film", a.full_size != b.full_size),
-            ("the crop", a.crop != b.crop),
-        ];
-        if let Some((field, _)) = differs.into_iter().find(|(_, differs)| *differs) {
-            return Err(FilmError::Stranger { field });
-        }
-        for (id, _) in &other.blocks {
-            let new = id.samples();
-            let common = self.blocks.iter().map(|(id, _)| id.samples()).find_map(|old| {
-                let common = old.start.max(new.start)..old.end.min(new.end);
-                (common.start < common.end).then_some(common)
-            });
-            if let Some(samples) = common {
-                return Err(FilmError::Overlap { samples });
+    /// The parts of `wanted` that are not here.
+    fn missing(&self, wanted: Range<u64>) -> Vec<Range<u64>> {
+        let (mut missing, mut at) = (Vec::new(), wanted.start);
+        for have in self.samples() {
+            if have.start.min(wanted.end) > at {
+                missing.push(at..have.start.min(wanted.end));
             }
+            at = at.max(have.end);
         }
-        self.blocks.extend(other.blocks);
-        self.blocks.sort_by_key(|(id, _)| id.samples().start);
-        self.join_halves();
-        Ok(())
+        if at < wanted.end {
+            missing.push(at..wanted.end);
+        }
+        missing
     }
 
-    fn join_halves(&mut self) {
-        let mut joined: Vec<(BlockId, Vec<DVec3>)> = Vec::with_capacity(self.blocks.len());
+    fn overlap(&self, other: &Self) -> Option<Range<u64>> {
+        let theirs = other.samples();
+        self.samples().into_iter().find_map(|a| {
+            theirs.iter().map(|b| a.start.max(b.start)..a.end.min(b.end)).find(|common| common.start < common.end)
+        })
+    }
+
+    /// Adds blocks that have no sample in common with those here.
+    fn add(&mut self, blocks: impl IntoIterator<Item = (BlockId, Arc<[f64]>)>) {
+        self.blocks.extend(blocks);
+        self.blocks.sort_by_key(|(id, _)| id.samples().start);
+        let mut joined: Vec<(BlockId, Arc<[f64]>)> = Vec::with_capacity(self.blocks.len());
         for (mut id, mut sums) in self.blocks.drain(..) {
             while let Some((left, _)) = joined.last()
                 && let Some(parent) = left.parent_with(id)
                 && let Some((_, left_sums)) = joined.pop()
             {
-                sums.iter_mut().zip(left_sums).for_each(|(right, left)| *right = left + *right);
+                sums = left_sums.iter().zip(&*sums).map(|(left, right)| left + right).collect();
                 id = parent;
             }
             joined.push((id, sums));
@@ -207,115 +163,271 @@ impl Film {
         self.blocks = joined;
     }
 
+    fn count(&self) -> u64 {
+        self.blocks.iter().map(|(id, _)| 1 << id.level).sum()
+    }
+}
+
+/// What some samples of the pixels of a tile add up to.
+#[derive(Debug)]
+pub(crate) struct TileSums {
+    blocks: Vec<(BlockId, Vec<f64>)>,
+}
+
+impl TileSums {
+    pub(crate) const fn new() -> Self {
+        Self { blocks: Vec::new() }
+    }
+
+    /// Adds the next pixel, all of which must have the same samples. `write` appends the numbers that the film keeps of a sum.
+    pub(crate) fn push<V: Copy>(&mut self, pixels: usize, sum: &PixelSum<V>, write: impl Fn(V, &mut Vec<f64>)) {
+        for (at, (id, value)) in sum.blocks.iter().enumerate() {
+            if self.blocks.len() == at {
+                self.blocks.push((*id, Vec::with_capacity(3 * pixels)));
+            }
+            write(*value, &mut self.blocks[at].1);
+        }
+    }
+}
+
+impl Film {
+    /// A film without samples.
+    ///
+    /// # Errors
+    /// [`RenderError::Film`] if there is no memory for the sums of its pixels.
+    pub(crate) fn new(origin: FilmOrigin, picture: Picture) -> Result<Self, RenderError> {
+        let PixelRect { x0, y0, x1, y1 } = origin.crop;
+        let (width, height) = (x1 - x0, y1 - y0);
+        // Tried now, so that a film that does not fit is told at once and not after an hour.
+        let sums = u64::from(width) * u64::from(height) * origin.sums_per_pixel() as u64;
+        let mut room: Vec<f64> = Vec::new();
+        if usize::try_from(sums).ok().and_then(|sums| room.try_reserve_exact(sums).ok()).is_none() {
+            let bytes = sums.saturating_mul(8);
+            return Err(RenderError::Film(vdf_image::ImageError::Memory { width, height, bytes }));
+        }
+        let tiles = vec![FilmTile::default(); tile_count(origin.crop)];
+        Ok(Self { origin, picture, tiles, counters: Counters::default(), runs: Vec::new() })
+    }
+
+    /// What the samples are samples of.
+    #[must_use]
+    pub const fn origin(&self) -> &FilmOrigin {
+        &self.origin
+    }
+
+    /// What a file of the picture says beside its pixels.
+    #[must_use]
+    pub const fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    /// The runs of the program that made the samples.
+    #[must_use]
+    pub fn runs(&self) -> &[FilmRun] {
+        &self.runs
+    }
+
+    /// Remembers a run, and what it took until now.
+    pub fn set_run(&mut self, number: usize, run: FilmRun) {
+        self.runs.truncate(number);
+        self.runs.push(run);
+    }
+
+    /// Takes the film as a part of a render of so many samples per pixel: a longer one than it was begun for, say.
+    #[must_use]
+    pub fn of_spp(mut self, spp: u32) -> Self {
+        self.origin.spp = spp;
+        self
+    }
+
+    /// How the queries of all samples were answered.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Number of tiles: squares of 16 pixels from the top left corner of the crop, row by row, cut at its edges.
+    #[must_use]
+    pub const fn tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// The parts of the samples `wanted` that tile `tile` has not yet.
+    #[must_use]
+    pub fn missing_of_tile(&self, tile: usize, wanted: Range<u32>) -> Vec<Range<u64>> {
+        self.tiles[tile].missing(wanted.start.into()..wanted.end.into())
+    }
+
+    /// The end of the samples that any tile has; 0 if none has any.
+    #[must_use]
+    pub fn samples_end(&self) -> u64 {
+        self.tiles.iter().filter_map(|t| t.blocks.last()).map(|(id, _)| id.samples().end).max().unwrap_or(0)
+    }
+
+    /// Up to which sample all tiles of `part` are complete.
+    #[must_use]
+    pub fn complete_until(&self, part: &FilmPart) -> u32 {
+        let ends = (0..self.tiles.len()).filter(|&tile| part.has_tile(tile)).map(|tile| {
+            let missing = self.missing_of_tile(tile, part.samples.clone());
+            missing.first().map_or(part.samples.end, |first| first.start as u32)
+        });
+        ends.min().unwrap_or(part.samples.end)
+    }
+
+    /// How many samples of `part` are not here: pixels times samples.
+    #[must_use]
+    pub fn missing_samples(&self, part: &FilmPart) -> u64 {
+        let tiles = tile_rects(self.origin.crop).enumerate().filter(|(tile, _)| part.has_tile(*tile));
+        let missing = tiles.map(|(tile, rect)| {
+            let samples = self.missing_of_tile(tile, part.samples.clone()).into_iter().map(|r| r.end - r.start);
+            samples.sum::<u64>() * area(rect)
+        });
+        missing.sum()
+    }
+
+    /// The samples that all tiles have together: pixels times samples.
+    #[must_use]
+    pub fn total_samples(&self) -> u64 {
+        tile_rects(self.origin.crop).map(area).zip(&self.tiles).map(|(area, tile)| area * tile.count()).sum()
+    }
+
+    /// The ranges of samples that every pixel has, in order.
+    #[must_use]
+    pub fn samples(&self) -> Vec<Range<u64>> {
+        let Some((first, rest)) = self.tiles.split_first() else { return Vec::new() };
+        rest.iter().fold(first.samples(), |common, tile| {
+            let theirs = tile.samples();
+            let both = common.iter().flat_map(|a| theirs.iter().map(|b| a.start.max(b.start)..a.end.min(b.end)));
+            both.filter(|r| r.start < r.end).collect()
+        })
+    }
+
+    /// What is missing of the samples `wanted`, range by range.
+    #[must_use]
+    pub fn missing(&self, wanted: Range<u32>) -> Vec<MissingSamples> {
+        let mut missing: Vec<MissingSamples> = Vec::new();
+        let of = self.tiles.len();
+        for tile in 0..of {
+            for samples in self.missing_of_tile(tile, wanted.clone()) {
+                match missing.iter_mut().find(|m| m.samples == samples) {
+                    Some(known) => known.tiles += 1,
+                    None => missing.push(MissingSamples { samples, tiles: 1, of }),
+                }
+            }
+        }
+        missing.sort_by_key(|m| (m.samples.start, m.samples.end));
+        missing
+    }
+
+    pub(crate) fn add_tile(&mut self, tile: usize, sums: TileSums, counters: &Counters) {
+        self.tiles[tile].add(sums.blocks.into_iter().map(|(id, sums)| (id, sums.into())));
+        self.counters += *counters;
+    }
+
+    /// Whether all samples of `other` are already here.
+    #[must_use]
+    pub fn contains(&self, other: &Self) -> bool {
+        self.tiles.iter().zip(&other.tiles).all(|(a, b)| b.samples().into_iter().all(|r| a.missing(r).is_empty()))
+    }
+
+    /// Adds the samples of `other`. The result does not depend on the order in which films are merged, but for the order of [`Film::runs`].
+    ///
+    /// # Errors
+    /// If the films are of different renders or have a sample in common; then this film is unchanged.
+    pub fn merge(&mut self, other: Self) -> Result<(), FilmError> {
+        self.origin.check_same_render(&other.origin)?;
+        let mut overlaps = self.tiles.iter().zip(&other.tiles).filter_map(|(a, b)| a.overlap(b));
+        if let Some(samples) = overlaps.next() {
+            return Err(FilmError::Overlap { samples, tiles: 1 + overlaps.count() });
+        }
+        for (tile, new) in self.tiles.iter_mut().zip(other.tiles) {
+            tile.add(new.blocks);
+        }
+        self.counters += other.counters;
+        self.runs.extend(other.runs);
+        Ok(())
+    }
+
     /// The image: the mean of the samples of each pixel.
     ///
     /// # Errors
-    /// If the samples are not all those from 0 to some number.
+    /// If the samples are not all those from 0 to some number, the same for all tiles; or if there is no memory.
     pub fn develop(&self) -> Result<Image, FilmError> {
-        let ranges = self.samples();
-        let n = match ranges.as_slice() {
-            [all] if all.start == 0 => all.end,
-            [first, ..] if first.start == 0 => return Err(FilmError::Missing { from: first.end }),
-            _ => return Err(FilmError::Missing { from: 0 }),
-        };
+        let missing = self.missing(0..u32::try_from(self.samples_end().max(1)).unwrap_or(u32::MAX));
+        if missing.is_empty() { self.develop_so_far() } else { Err(FilmError::Missing { missing }) }
+    }
+
+    /// The image so far: each pixel is the mean of the samples that it has, and black if it has none.
+    ///
+    /// # Errors
+    /// If there is no memory.
+    pub fn develop_so_far(&self) -> Result<Image, FilmError> {
         let FilmOrigin { full_size, crop, .. } = self.origin;
-        let mut image = Image::cropped(full_size, [crop.x0, crop.y0], [crop.x1 - crop.x0, crop.y1 - crop.y0]);
-        for (i, pixel) in image.pixels.iter_mut().enumerate() {
-            let total = self.blocks.iter().fold(DVec3::ZERO, |total, (_, sums)| total + sums[i]);
-            *pixel = (total / n as f64).as_vec3();
-        }
+        let size = [crop.x1 - crop.x0, crop.y1 - crop.y0];
+        let mut image =
+            Image::try_cropped(full_size, [crop.x0, crop.y0], size).map_err(|_| FilmError::Memory { size })?;
+        self.each_pixel(|at, n, sums| {
+            let [r, g, b] = [0, 1, 2].map(|i| (sums[i] / n) as f32);
+            image.pixels[at] = Rgb::new(r, g, b);
+        });
         Ok(image)
     }
+
+    /// The channels of the layers, such as `normal.X`; none if there are no layers. Pixels without samples are 0.
+    #[must_use]
+    pub fn develop_layers(&self) -> Vec<Channel> {
+        let FilmOrigin { crop, layers, .. } = self.origin;
+        let sums = LayerSums::new(layers);
+        let mut channels = sums.channels(area(crop) as usize);
+        if !channels.is_empty() {
+            self.each_pixel(|at, n, kept| sums.develop(at, n, kept, &mut channels));
+        }
+        channels
+    }
+
+    /// Calls `pixel` with the number of each pixel that has samples, their number and their sums.
+    fn each_pixel(&self, mut pixel: impl FnMut(usize, f64, &[f64])) {
+        let crop = self.origin.crop;
+        let (width, stride) = ((crop.x1 - crop.x0) as usize, self.origin.sums_per_pixel());
+        let mut sums = vec![0.0; stride];
+        for (rect, tile) in tile_rects(crop).zip(&self.tiles).filter(|(_, tile)| !tile.blocks.is_empty()) {
+            let n = tile.count() as f64;
+            for (i, (x, y)) in pixels(rect).enumerate() {
+                sums.fill(0.0);
+                for (_, block) in &tile.blocks {
+                    sums.iter_mut().zip(&block[i * stride..]).for_each(|(total, sum)| *total += sum);
+                }
+                pixel((y - crop.y0) as usize * width + (x - crop.x0) as usize, n, &sums);
+            }
+        }
+    }
+}
+
+/// The tiles of a rectangle, row by row.
+pub(crate) fn tile_rects(rect: PixelRect) -> impl Iterator<Item = PixelRect> {
+    let PixelRect { x0, y0, x1, y1 } = rect;
+    // Not by `step_by`: the next corner may not have a 32-bit number.
+    let starts = |from: u32, to: u32| (0..(to - from).div_ceil(TILE)).map(move |i| from + i * TILE);
+    starts(y0, y1).flat_map(move |y| starts(x0, x1).map(move |x| (x, y))).map(move |(x, y)| PixelRect {
+        x0: x,
+        y0: y,
+        x1: x + TILE.min(x1 - x),
+        y1: y + TILE.min(y1 - y),
+    })
+}
+
+fn area(r: PixelRect) -> u64 {
+    u64::from(r.x1 - r.x0) * u64::from(r.y1 - r.y0)
+}
+
+fn tile_count(rect: PixelRect) -> usize {
+    (rect.x1 - rect.x0).div_ceil(TILE) as usize * (rect.y1 - rect.y0).div_ceil(TILE) as usize
+}
+
+/// The pixels of a rectangle, row by row.
+pub(crate) fn pixels(r: PixelRect) -> impl Iterator<Item = (u32, u32)> {
+    (r.y0..r.y1).flat_map(move |y| (r.x0..r.x1).map(move |x| (x, y)))
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Sampler;
-
-    const PIXELS: usize = 3;
-
-    fn origin(seed: u64) -> FilmOrigin {
-        let crop = PixelRect { x0: 0, y0: 0, x1: 3, y1: 1 };
-        let integrator = Integrator::Volpath;
-        let (transmittance, roulette, estimator, sampler) = ("analytic", "standard", "thesis", "independent");
-        FilmOrigin { scene: 1, integrator, transmittance, roulette, estimator, sampler, seed, full_size: [3, 1], crop }
-    }
-
-    /// Values whose sums depend on the order: of very different sizes.
-    fn value(pixel: usize, sample: u32) -> DVec3 {
-        let mut u = Sampler::new(3, pixel as u32, 0, sample);
-        DVec3::from_array([(); 3].map(|()| u.next_1d() * (30.0 * u.next_1d()).exp()))
-    }
-
-    fn film(samples: Range<u32>) -> Film {
-        let mut film = Film::new(origin(7));
-        for pixel in 0..PIXELS {
-            let mut sum = PixelSum::default();
-            samples.clone().for_each(|s| sum.add(s, value(pixel, s)));
-            film.set(pixel, PIXELS, &sum);
-        }
-        film
-    }
-
-    /// The definition: the sum of a block is that of its halves.
-    fn block(pixel: usize, first: u32, size: u32) -> DVec3 {
-        match size {
-            1 => value(pixel, first),
-            _ => block(pixel, first, size / 2) + block(pixel, first + size / 2, size / 2),
-        }
-    }
-
-    #[test]
-    fn sums_are_those_of_the_tree() {
-        for n in 1..70_u32 {
-            let developed = film(0..n).develop().unwrap();
-            for pixel in 0..PIXELS {
-                let (mut total, mut first) = (DVec3::ZERO, 0);
-                while first < n {
-                    let size = 1 << (n - first).ilog2();
-                    total += block(pixel, first, size);
-                    first += size;
-                }
-                assert_eq!(developed.pixels[pixel], (total / f64::from(n)).as_vec3(), "{n} samples");
-            }
-        }
-    }
-
-    #[test]
-    fn a_film_is_the_same_however_it_was_cut() {
-        for n in [1_u32, 2, 7, 8, 64, 77] {
-            let whole = film(0..n);
-            for cut in 0..300 {
-                let mut u = Sampler::new(11, cut, n, 0);
-                let mut borders = vec![0, n];
-                borders.extend((0..cut % 5).map(|_| (u.next_1d() * f64::from(n)) as u32));
-                borders.sort_unstable();
-                borders.dedup();
-                let mut parts: Vec<Film> = borders.windows(2).map(|b| film(b[0]..b[1])).collect();
-                while parts.len() > 1 {
-                    let part = parts.swap_remove((u.next_1d() * parts.len() as f64) as usize);
-                    let into = (u.next_1d() * parts.len() as f64) as usize;
-                    parts[into].merge(part).unwrap();
-                }
-                assert_eq!(parts[0], whole, "{n} samples cut at {borders:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn strangers_overlaps_and_gaps_are_refused() {
-        let mut a = film(0..5);
-        let unchanged = a.clone();
-        assert_eq!(a.merge(film(3..9)), Err(FilmError::Overlap { samples: 3..4 }));
-        let other = Film { origin: origin(8), ..film(5..9) };
-        assert_eq!(a.merge(other), Err(FilmError::Stranger { field: "the seed" }));
-        assert_eq!(a, unchanged);
-        a.merge(film(6..9)).unwrap();
-        assert_eq!(a.samples(), [0..5, 6..9]);
-        assert_eq!(a.develop(), Err(FilmError::Missing { from: 5 }));
-        assert_eq!(film(2..4).develop(), Err(FilmError::Missing { from: 0 }));
-        a.merge(film(5..6)).unwrap();
-        assert_eq!(a, film(0..9));
-    }
-}
+mod tests;

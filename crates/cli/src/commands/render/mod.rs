@@ -1,33 +1,55 @@
 //! `vdf render`.
 
+mod display;
+mod output;
+mod passes;
+mod sequence;
+
 use std::{
     io::Write as _,
     path::{Path, PathBuf},
+    sync::{Arc, atomic::AtomicBool},
 };
 
 use anyhow::{Context as _, anyhow};
-use serde::Serialize;
-use vdf_image::{
-    AttributeValue, ComponentFormat, ExrOptions, StagedFile, check_distinct, check_writable, shown, stage_exr_with,
-    stage_png,
-};
+use vdf_image::{StagedFile, check_distinct, shown};
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Estimator, Integrator, PrepareOptions, PreparedScene, RenderOptions, Rendering, Roulette, SamplerKind, Statistics,
-    TransmittanceEstimator,
+    Estimator, Film, Integrator, PrepareOptions, PreparedScene, RenderOptions, Roulette, SamplerKind,
+    TransmittanceEstimator, thread_count,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
 use vdf_visibility::Method;
 
+use self::display::Display;
+pub(super) use self::output::{Places, check_places, stage_json, write_json, write_picture};
+use self::passes::{Checkpoint, Plan, Rendered};
 use crate::{
-    args::{EstimatorName, RenderArgs, RouletteName, SamplerName, TransmittanceName},
-    failure::{Failure, say},
+    args::{EstimatorName, PictureArgs, ProgressName, RenderArgs, RouletteName, SamplerName, TransmittanceName},
+    failure::{Failure, say, speak_json},
     progress::Reporter,
 };
 
+/// So many samples per pixel are more than a limit of time lets anyone take.
+const MOST_SAMPLES: u32 = 1 << 30;
+
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let options = options(args)?;
+    if args.long.progress == ProgressName::Json {
+        speak_json();
+    }
+    let renders = sequence::renders(args)?;
+    let asked = picture_signal();
+    let reporter = Reporter::of_kind(args.quiet, args.long.progress)?;
+    renders.iter().try_for_each(|args| render(args, &reporter, &asked))
+}
+
+/// One picture, or one shard of it.
+fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<(), Failure> {
+    let mut options = options(args)?;
+    if args.long.time_limit.is_some() {
+        options.spp = Some(options.spp.unwrap_or(MOST_SAMPLES));
+    }
     let prepare = PrepareOptions {
         // Proofs of flights need a field, whatever the lights.
         method: args.method.or_else(|| args.segment_first.then(Method::best_with_voxels)),
@@ -41,53 +63,136 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
     options.validate(&named.scene)?;
     let output = output(args, &named)?;
+    if args.long.skip_existing && output.exists() {
+        say(format_args!("note: {} is there and is not rendered again", shown(output.path())));
+        return Ok(());
+    }
     named.warn();
     let Named { name, scene, .. } = named;
 
-    let reporter = Reporter::new(args.quiet)?;
-    let prepared = PreparedScene::new(scene, &prepare, &reporter)?;
+    let prepared = PreparedScene::new(scene, &prepare, reporter)?;
     prepared.notes().iter().for_each(|note| say(format_args!("note: {note}")));
-    let rendering = prepared.render(&options, &reporter);
-    let stream = match (&rendering, &args.record_queries) {
-        (Ok(_), Some(_)) => Some(record_queries(&prepared, &options, args.max_queries, &reporter)).transpose(),
+    let checkpoint = args.long.checkpoint.as_ref();
+    let checkpoint = checkpoint.map(|path| Checkpoint { path: path.clone(), every: args.long.every });
+    let kept = checkpoint.as_ref().map(|c| (c.path.as_path(), args.long.resume));
+    let film = passes::begin(prepared.film(&options, &name)?, kept)?;
+    if checkpoint.is_some() {
+        // Ctrl-C lets the last one be written.
+        reporter.writes();
+    }
+    let part = args.long.part(film.origin().spp);
+    let plan = Plan {
+        prepared: &prepared,
+        options: &options,
+        part,
+        time_limit: args.long.time_limit,
+        threads: thread_count(options.threads)?,
+        machine: machine(),
+        display: args.long.display.as_ref().map(|address| Display::new(address, &name)),
+    };
+    let so_far = |film: &Film| output.write_so_far(film, &args.picture);
+    let rendered = passes::render(&plan, film, checkpoint.as_ref(), reporter, asked, &so_far);
+    let stream = match (&rendered, &args.record_queries) {
+        (Ok(_), Some(_)) => Some(record_queries(&prepared, &options, args.max_queries, reporter)).transpose(),
         _ => Ok(None),
     };
     reporter.finish();
-    let (rendering, stream) = (rendering?, stream?);
+    let (rendered, stream) = (rendered?, stream?);
     reporter.writes();
     // A Ctrl-C after the last tile: the promise is that nothing is written.
     if reporter.interrupted() {
         return Err(Failure::Interrupted);
     }
-
-    if args.quiet && rendering.statistics.refused > 0 {
-        say(format_args!(
-            "warning: {} samples were not finite or negative and were left out",
-            rendering.statistics.refused
-        ));
-    }
-    let attributes = attributes(&rendering.statistics, &name, prepared.scene());
-    write_all(&rendering, &output, args, prepared.scene(), &attributes)?;
+    finish(args, &plan, &rendered, &output)?;
     // Last, so that queries do not stay without their picture.
     if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
         write_stream(path, stream)?;
-    }
-    let stdout = &mut std::io::stdout();
-    if !args.quiet {
-        writeln!(stdout, "{}", rendering.statistics)?;
-        writeln!(stdout, "wrote          {} and {}", shown(&output.exr), shown(&output.png))?;
-        if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
+        if !args.quiet {
             let (n, paths) = (stream.queries.len(), stream.origin.paths_recorded);
-            writeln!(stdout, "recorded       {n} queries of {paths} paths in {}", shown(path))?;
+            writeln!(std::io::stdout(), "recorded       {n} queries of {paths} paths in {}", shown(path))?;
         }
     }
     Ok(())
 }
 
+/// Writes the results and tells of them.
+fn finish(args: &RenderArgs, plan: &Plan<'_>, rendered: &Rendered, output: &Output) -> Result<(), Failure> {
+    let Rendered { film, end } = rendered;
+    let spp = end - plan.part.samples.start;
+    let statistics = plan.prepared.statistics(plan.options, film, spp)?;
+    if args.quiet && statistics.refused > 0 {
+        say(format_args!("warning: {} samples were not finite or negative and were left out", statistics.refused));
+    }
+    let stats = args.stats.as_ref().map(|path| stage_json(path, &statistics)).transpose()?;
+    let stdout = &mut std::io::stdout();
+    let wrote = match output {
+        Output::Film(path) => {
+            let film = film.stage(path).map_err(|e| Failure::Work(e.into()))?;
+            let files = stats.into_iter().chain([film]).collect();
+            StagedFile::persist_all(files).map_err(|error| Failure::Work(error.into()))?;
+            shown(path).to_string()
+        }
+        Output::Picture(places) => {
+            // A render that was cut short is a whole render of fewer samples.
+            let film = film.clone().of_spp(*end);
+            let image = film.develop().map_err(|e| Failure::Work(e.into()))?;
+            write_picture(places, &image, &film, &args.picture, stats)?;
+            format!("{} and {}", shown(&places.exr), shown(&places.png))
+        }
+    };
+    if !args.quiet {
+        writeln!(stdout, "{statistics}")?;
+        writeln!(stdout, "wrote          {wrote}")?;
+    }
+    Ok(())
+}
+
+/// Set by the signal that asks for the picture so far.
+fn picture_signal() -> Arc<AtomicBool> {
+    let asked = Arc::new(AtomicBool::new(false));
+    // If that cannot be had, there is no picture on demand, and all else works.
+    #[cfg(unix)]
+    drop(signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked)));
+    asked
+}
+
+/// The name of this machine, where the system tells it.
+fn machine() -> String {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    name.or_else(|| std::env::var("HOSTNAME").ok())
+        .or_else(|| std::env::var("COMPUTERNAME").ok())
+        .map_or_else(String::new, |name| name.trim().to_owned())
+}
+
 /// Where results go.
-struct Output {
-    exr: PathBuf,
-    png: PathBuf,
+enum Output {
+    /// The picture of a render.
+    Picture(Places),
+    /// The film of a shard.
+    Film(PathBuf),
+}
+
+impl Output {
+    /// The file that appears last.
+    fn path(&self) -> &Path {
+        match self {
+            Self::Picture(places) => &places.exr,
+            Self::Film(path) => path,
+        }
+    }
+
+    fn exists(&self) -> bool {
+        self.path().exists()
+    }
+
+    fn write_so_far(&self, film: &Film, how: &PictureArgs) -> Result<(), Failure> {
+        let places = match self {
+            Self::Picture(places) => places.partial(),
+            Self::Film(path) => Places::of_exr(path.with_extension("exr"))?.partial(),
+        };
+        let image = film.develop_so_far().map_err(|e| Failure::Work(e.into()))?;
+        write_picture(&places, &image, film, how, None)
+    }
 }
 
 /// Writes recorded queries.
@@ -130,6 +235,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         threads: args.threads,
         crop: args.crop,
         segment_first: args.segment_first,
+        layers: args.aov.iter().copied().collect(),
     })
 }
 
@@ -179,87 +285,32 @@ pub(super) fn load(
 
 /// Where to write; fails now rather than after an hour of rendering.
 fn output(args: &RenderArgs, named: &Named) -> Result<Output, Failure> {
-    let exr = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", named.name)));
-    if exr.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) {
-        return Err(Failure::Usage(anyhow!(
-            "{}: the output must end in .exr; a .png is written beside it",
-            shown(&exr)
-        )));
-    }
-    let png = exr.with_extension("png");
-    let outputs = [
-        ("--output", Some(&exr)),
-        ("the PNG beside it", Some(&png)),
-        ("--stats", args.stats.as_ref()),
-        ("--record-queries", args.record_queries.as_ref()),
-    ];
-    let outputs = outputs.into_iter().filter_map(|(name, path)| Some((name, path?.as_path())));
-    named.check_outputs(&outputs.clone().collect::<Vec<_>>())?;
-    for (_, path) in outputs {
-        check_writable(path).with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)?;
-    }
-    Ok(Output { exr, png })
-}
-
-/// Writes the statistics, the PNG and the EXR, and only when all are written moves them to their places, the EXR last: who waits for
-/// it finds all three, and a failure leaves none.
-fn write_all(
-    rendering: &Rendering,
-    output: &Output,
-    args: &RenderArgs,
-    scene: &Scene,
-    attributes: &[(&str, AttributeValue)],
-) -> Result<(), Failure> {
-    let format = match scene.film.component_format {
-        vdf_scene::ComponentFormat::Float16 => ComponentFormat::Half,
-        vdf_scene::ComponentFormat::Float32 => ComponentFormat::Float,
+    let mut outputs = vec![];
+    let output = match args.long.shard {
+        None => {
+            let exr = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.exr", named.name)));
+            let places = Places::of_exr(exr)?;
+            outputs.extend([("--output", places.exr.clone()), ("the PNG beside it", places.png.clone())]);
+            Output::Picture(places)
+        }
+        Some(shard) => {
+            let name = format!("{}.{}-of-{}.film", named.name, shard.index, shard.count);
+            let film = args.output.clone().unwrap_or_else(|| PathBuf::from(name));
+            if film.extension().is_none_or(|e| !e.eq_ignore_ascii_case("film")) {
+                let film = shown(&film);
+                return Err(Failure::Usage(anyhow!(
+                    "{film}: the output of a shard must end in .film; vdf merge makes the EXR"
+                )));
+            }
+            outputs.push(("--output", film.clone()));
+            Output::Film(film)
+        }
     };
-    let options = ExrOptions::default().with_component_format(format);
-    let mut files = Vec::new();
-    if let Some(path) = &args.stats {
-        files.push(stage_json(path, &rendering.statistics)?);
-    }
-    files.push(stage_png(&output.png, &rendering.image)?);
-    files.push(stage_exr_with(&output.exr, &rendering.image, attributes, &options)?);
-    StagedFile::persist_all(files).map_err(|error| Failure::Work(error.into()))
-}
-
-/// Writes the figures of a run for machines.
-pub(super) fn write_json(path: &Path, figures: &impl Serialize) -> Result<(), Failure> {
-    let file = stage_json(path, figures)?;
-    file.persist().with_context(|| format!("cannot write {}", shown(path))).map_err(Failure::Work)
-}
-
-fn stage_json(path: &Path, figures: &impl Serialize) -> Result<StagedFile, Failure> {
-    let json =
-        serde_json::to_string_pretty(figures).context("cannot express the figures as JSON").map_err(Failure::Work)?;
-    StagedFile::write(path, |w| writeln!(w, "{json}"))
-        .with_context(|| format!("cannot write {}", shown(path)))
-        .map_err(Failure::Work)
-}
-
-/// What the EXR says of its making.
-fn attributes(s: &Statistics, name: &str, scene: &Scene) -> Vec<(&'static str, AttributeValue)> {
-    let count = |n: u64| AttributeValue::from(n as f64);
-    let mut attributes = vec![
-        ("vdf.version", s.version.into()),
-        ("vdf.scene", name.into()),
-        ("vdf.sceneHash", format!("{:08x}", scene.checksum()).into()),
-        ("vdf.method", s.method.into()),
-        ("vdf.integrator", s.integrator.into()),
-        ("vdf.transmittance", s.transmittance.into()),
-        ("vdf.roulette", s.roulette.into()),
-        ("vdf.estimator", s.estimator.into()),
-        ("vdf.sampler", s.sampler.into()),
-        ("vdf.samplesPerPixel", i64::from(s.spp).into()),
-        ("vdf.seed", s.seed.to_string().into()),
-        ("vdf.queries", count(s.queries)),
-        ("vdf.spatialQueries", count(s.spatial)),
-        ("vdf.provedQueries", count(s.proved)),
-        ("vdf.buildTimeSeconds", s.t_build.into()),
-        ("vdf.renderTimeSeconds", s.t_render.into()),
-    ];
-    attributes.extend(s.voxel_size.map(|v| ("vdf.voxelSize", v.into())));
-    attributes.extend(s.samples_per_segment.map(|n| ("vdf.samplesPerSegment", i64::from(n).into())));
-    attributes
+    let others =
+        [("--stats", &args.stats), ("--record-queries", &args.record_queries), ("--checkpoint", &args.long.checkpoint)];
+    outputs.extend(others.into_iter().filter_map(|(name, path)| Some((name, path.clone()?))));
+    let outputs: Vec<(&str, &Path)> = outputs.iter().map(|(name, path)| (*name, path.as_path())).collect();
+    named.check_outputs(&outputs)?;
+    check_places(outputs.iter().map(|(_, path)| *path))?;
+    Ok(output)
 }

@@ -19,7 +19,7 @@ pub(super) struct Renders<'a> {
 /// Progress of a render as a part of the whole, which is counted in paths.
 struct Paths<'a> {
     whole: &'a dyn Progress,
-    spp: u32,
+    counts: bool,
 }
 
 impl Progress for Paths<'_> {
@@ -27,8 +27,10 @@ impl Progress for Paths<'_> {
 
     fn work_total(&self, _: u64) {}
 
-    fn work_done(&self, pixels: u64) {
-        self.whole.work_done(pixels * u64::from(self.spp));
+    fn work_done(&self, paths: u64) {
+        if self.counts {
+            self.whole.work_done(paths);
+        }
     }
 
     fn cancelled(&self) -> bool {
@@ -45,7 +47,7 @@ impl Renders<'_> {
             threads: self.plan.threads,
             ..PrepareOptions::with_method(method)
         };
-        Ok(self.alone.with_options(&options, &Paths { whole: self.progress, spp: 0 })?)
+        Ok(self.alone.with_options(&options, &Paths { whole: self.progress, counts: false })?)
     }
 
     /// The image and `T_render` in seconds.
@@ -57,7 +59,7 @@ impl Renders<'_> {
         spp: u32,
     ) -> Result<(Image, f64), LabError> {
         let options = self.options(integrator, seed, spp);
-        let rendering = prepared.render(&options, &Paths { whole: self.progress, spp })?;
+        let rendering = prepared.render(&options, &Paths { whole: self.progress, counts: true })?;
         Ok((rendering.image, rendering.statistics.t_render))
     }
 
@@ -65,7 +67,7 @@ impl Renders<'_> {
     /// progress.
     pub(super) fn halves(&self, integrator: Integrator, crop: Option<PixelRect>) -> Result<[Image; 2], LabError> {
         let half_spp = self.plan.half_spp;
-        let progress = Paths { whole: self.progress, spp: if crop.is_some() { 0 } else { half_spp } };
+        let progress = Paths { whole: self.progress, counts: crop.is_none() };
         let half = |seed| {
             let options = RenderOptions { crop, ..self.options(integrator, seed, half_spp) };
             self.alone.render(&options, &progress).map(|r| r.image)
