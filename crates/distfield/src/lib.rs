@@ -6,6 +6,10 @@
 //! [`ExtendedNeighbourhood`] with all that a free cuboid can prove, [`HopNeighbourhood`] with what several in a row can. Definitions are those of \[Houska2013\], chapters 3
 //! and 4.
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod amr;
 mod bytes;
 mod dsz;

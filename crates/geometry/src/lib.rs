@@ -14,6 +14,10 @@
 //! assert_eq!(bvh.intersect(&through).map(|hit| hit.t), Some(0.5));
 //! ```
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod bounds;
 mod hierarchy;
 mod intersect;

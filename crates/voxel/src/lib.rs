@@ -11,6 +11,10 @@
 //! [`VoxelSet::validate`] checks a set against its triangles. The error budget behind the promise,
 //! [`VoxelGrid::dilation`], is derived in `docs/numerics.md`. Definitions are those of \[Houska2013\], chapter 3.
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod clip;
 mod error;
 mod export;
