@@ -33,6 +33,7 @@ mod build;
 mod counters;
 mod error;
 mod light;
+mod lit;
 mod method;
 mod prover;
 mod query;
@@ -41,6 +42,7 @@ pub use build::{BuildReport, BuiltPart, LightReport, ProverOptions};
 pub use counters::Counters;
 pub use error::VisibilityError;
 pub use light::LightShape;
+pub use lit::{LitIntervals, MOST_TRIANGLES};
 pub use method::{FieldKind, Method, PointProver, UnknownMethod, method_table};
 pub use prover::{
     Answer, AreaNeighbourhood, DistanceField, FieldProver, LightBuffer, LightProver, LookUp, Provers, Refusal,
