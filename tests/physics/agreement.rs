@@ -141,7 +141,12 @@ fn lit_parts_of_rays_agree_with_queries() {
             let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
             println!("{samples} samples, {sampler:?}, part {part}: {:.1e} ± {:.1e}", mean / level, error / level);
             assert!(mean.abs() < 5.0 * error, "{samples} samples, {sampler:?}, part {part}: {mean} ± {error}");
-            assert!(error < 1e-2 * level, "{samples} samples, {sampler:?}, part {part}: too noisy, {error} of {level}");
+            // A quarter of the image is twice as noisy as all of it.
+            let enough = if part == 4 { 1e-2 } else { 2.5e-2 };
+            assert!(
+                error < enough * level,
+                "{samples} samples, {sampler:?}, part {part}: too noisy, {error} of {level}"
+            );
         }
     }
 }
