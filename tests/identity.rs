@@ -78,8 +78,10 @@ fn images_of_each_estimator_and_sampler_do_not_depend_on_method() {
                     }
                     let base = Options { integrator, estimator, sampler, ..options() };
                     let (proving, images) = all_alike(name, &scene, &base, &[8.0]);
-                    // Where distances are drawn towards a light other questions are asked, and few: not every method proves one of them.
-                    assert!(!proved || 2 * proving > images, "{name}: hardly anything proved");
+                    // Where distances are drawn towards a light other questions are asked, and few: not every method proves one of them. Where it is
+                    // known what is lit, none is asked.
+                    let asked = proved && (integrator, estimator) != (INTEGRATORS[1], Estimator::Lit);
+                    assert!(!asked || 2 * proving > images, "{name}: hardly anything proved");
                 }
             }
         }

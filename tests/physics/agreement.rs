@@ -108,3 +108,45 @@ fn the_estimators_of_paths_agree() {
         }
     }
 }
+
+/// Light of several points: one outside, one in fog behind a body, one shut in, so that no ray sees it, and a faint one; beside an area light and a
+/// sky. The mean over the image and over each row of it: 5 standard errors are a false alarm of 6·10⁻⁷ each.
+#[test]
+fn lit_parts_of_rays_agree_with_queries() {
+    let once = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
+    let mut scene = Scene { integrator: once, ..scene(0.0, 0.9, 1.0) };
+    scene.surfaces[1].triangles.pop();
+    for (position, intensity) in [
+        (dvec3(-0.1, 0.3, 2.4), 1.0),
+        (dvec3(-0.5, -0.4, 1.8), 100.0),
+        (dvec3(0.1, -0.2, 4.4), 0.01),
+        (dvec3(0.6, 0.0, 3.0), 3.0),
+    ] {
+        scene.emitters.push(Emitter::Point { position, intensity: Rgb::splat(intensity) });
+    }
+    let image = |estimator, sampler, samples, spp, seed| {
+        let integrator = Integrator::raymarch(samples);
+        let o = Options { integrator, estimator, sampler, spp: Some(spp), seed: Some(seed), ..options() };
+        rendered(&scene, &o).image.pixels
+    };
+    let asked = image(Estimator::Equiangular, SamplerKind::Independent, 32, 128, 1);
+    let level = asked.iter().map(|p| f64::from(p.x)).sum::<f64>() / asked.len() as f64;
+    for (samples, sampler) in [(1, SamplerKind::Sobol), (1, SamplerKind::Independent), (6, SamplerKind::Independent)] {
+        let lit = image(Estimator::Lit, sampler, samples, 128, 2);
+        for part in 0..5 {
+            let kept = asked.iter().zip(&lit).enumerate().filter(|(i, _)| part == 4 || i * 4 / asked.len() == part);
+            let differences: Vec<f64> = kept.map(|(_, (a, b))| f64::from(a.x - b.x)).collect();
+            let n = differences.len() as f64;
+            let mean = differences.iter().sum::<f64>() / n;
+            let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+            println!("{samples} samples, {sampler:?}, part {part}: {:.1e} ± {:.1e}", mean / level, error / level);
+            assert!(mean.abs() < 5.0 * error, "{samples} samples, {sampler:?}, part {part}: {mean} ± {error}");
+            // A quarter of the image is twice as noisy as all of it.
+            let enough = if part == 4 { 1e-2 } else { 2.5e-2 };
+            assert!(
+                error < enough * level,
+                "{samples} samples, {sampler:?}, part {part}: too noisy, {error} of {level}"
+            );
+        }
+    }
+}

@@ -116,19 +116,21 @@ fn with_the_light_near_the_axis() {
 /// where it is behind, a light in clear air that is taken for one in dense fog.
 #[test]
 fn with_all_that_is_hard_for_a_density() {
-    let mut check = Check::by("single scattering, hard for a density", (RAYMARCH, Estimator::Equiangular));
-    let fog =
-        |sigma_t, phase| Fog { min: vec3(-1.0, -1.0, 1.0), max: vec3(1.0, 1.0, 4.0), sigma_t, albedo: 0.8, phase };
-    for h in [1e-5, 1e-7, 1e-9] {
-        compare(&mut check, &format!("h {h}"), &[fog(0.7, Phase::Isotropic)], dvec3(h, 0.0, 2.2));
-    }
-    for g in [0.99, -0.99, 0.999, -0.999] {
-        for light in [dvec3(0.05, 0.0, 0.5), dvec3(0.3, -0.2, 2.5), dvec3(0.05, 0.02, 5.0)] {
-            let phase = Phase::HenyeyGreenstein { g };
-            compare(&mut check, &format!("g {g}, light {light}"), &[fog(0.7, phase)], light);
+    for estimator in [Estimator::Equiangular, Estimator::Lit] {
+        let mut check = Check::by("single scattering, hard for a density", (RAYMARCH, estimator));
+        let fog =
+            |sigma_t, phase| Fog { min: vec3(-1.0, -1.0, 1.0), max: vec3(1.0, 1.0, 4.0), sigma_t, albedo: 0.8, phase };
+        for h in [1e-5, 1e-7, 1e-9] {
+            compare(&mut check, &format!("h {h}"), &[fog(0.7, Phase::Isotropic)], dvec3(h, 0.0, 2.2));
         }
-    }
-    for light in [dvec3(0.0, 40.0, 2.0), dvec3(1e6, 0.0, 2.0), dvec3(3.0, 0.0, 1.5)] {
-        compare(&mut check, &format!("light {light}"), &[fog(5.0, Phase::Isotropic)], light);
+        for g in [0.99, -0.99, 0.999, -0.999] {
+            for light in [dvec3(0.05, 0.0, 0.5), dvec3(0.3, -0.2, 2.5), dvec3(0.05, 0.02, 5.0)] {
+                let phase = Phase::HenyeyGreenstein { g };
+                compare(&mut check, &format!("g {g}, light {light}"), &[fog(0.7, phase)], light);
+            }
+        }
+        for light in [dvec3(0.0, 40.0, 2.0), dvec3(1e6, 0.0, 2.0), dvec3(3.0, 0.0, 1.5)] {
+            compare(&mut check, &format!("light {light}"), &[fog(5.0, Phase::Isotropic)], light);
+        }
     }
 }

@@ -19,11 +19,12 @@ pub(crate) const INTEGRATORS: [Integrator; 2] = [VOLPATH, RAYMARCH];
 pub(crate) const TRACED: [(Integrator, Estimator); 2] =
     [(VOLPATH, Estimator::Thesis), (VOLPATH, Estimator::Equiangular)];
 /// All ways to find light scattered in fog.
-pub(crate) const WAYS: [(Integrator, Estimator); 4] = [
+pub(crate) const WAYS: [(Integrator, Estimator); 5] = [
     (VOLPATH, Estimator::Thesis),
     (VOLPATH, Estimator::Equiangular),
     (RAYMARCH, Estimator::Thesis),
     (RAYMARCH, Estimator::Equiangular),
+    (RAYMARCH, Estimator::Lit),
 ];
 
 /// Roundings that all samples share, of 2⁻²⁴ each: the light's weight and intensity, the phase function or BSDF, the transmittance twice,
@@ -64,6 +65,8 @@ impl Check {
             (Integrator::Volpath, Estimator::Equiangular) => "volpath, equiangular",
             (Integrator::Raymarch { .. }, Estimator::Thesis) => "raymarch",
             (Integrator::Raymarch { .. }, Estimator::Equiangular) => "raymarch, equiangular",
+            (Integrator::Volpath, Estimator::Lit) => "volpath, lit",
+            (Integrator::Raymarch { .. }, Estimator::Lit) => "raymarch, lit",
         }
     }
 

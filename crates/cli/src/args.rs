@@ -86,7 +86,7 @@ pub(crate) struct RenderArgs {
     /// When paths are ended by chance: as in Mitsuba 3, or earlier, as in the thesis's renderer; the mean is the same
     #[arg(long, value_enum, default_value_t = RouletteName::Standard)]
     pub(crate) roulette: RouletteName,
-    /// How light is looked for: as in the thesis, or with distances and directions drawn towards point lights, too, for less noise; of the same mean
+    /// How light is looked for: as in the thesis, or with distances and directions drawn towards point lights, too, for less noise; "lit" looks only where a ray is lit; all of the same mean
     #[arg(long, value_enum, default_value_t = EstimatorName::Thesis)]
     pub(crate) estimator: EstimatorName,
     /// How the samples of a pixel are spread: each for itself, or so that they fill it, which is less noisy
@@ -183,6 +183,7 @@ pub(crate) enum SamplerName {
 pub(crate) enum EstimatorName {
     Thesis,
     Equiangular,
+    Lit,
 }
 
 /// List the built-in scenes, or write one to disk.

@@ -39,11 +39,14 @@ pub enum Estimator {
     /// Distances are drawn by the angle that they subtend at a light \[Kulla2012\], too, and by `volpath` directions towards point lights: far less
     /// noise in thin fog and around lights.
     Equiangular,
+    /// By `raymarch` light of point emitters is gathered only where a ray is lit ([`vdf_visibility::LitIntervals`]); all else as `equiangular`, for
+    /// paths gained nothing by it (`docs/performance.md`).
+    Lit,
 }
 
 impl Estimator {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Thesis, Self::Equiangular];
+    pub const ALL: [Self; 3] = [Self::Thesis, Self::Equiangular, Self::Lit];
 
     /// The name on the command line.
     #[must_use]
@@ -51,6 +54,7 @@ impl Estimator {
         match self {
             Self::Thesis => "thesis",
             Self::Equiangular => "equiangular",
+            Self::Lit => "lit",
         }
     }
 }

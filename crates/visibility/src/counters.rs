@@ -23,6 +23,8 @@ pub struct Counters {
     pub flights: u64,
     /// Those that were proved free, each a ray saved; with any method those that miss the bounds of all occluders are among them.
     pub flights_proved: u64,
+    /// Segments of which it was found which parts a point light sees.
+    pub lit_segments: u64,
     /// Camera paths.
     pub paths: u64,
     /// Paths whose radiance was not finite or negative and was therefore left out. Must be 0.
@@ -41,6 +43,7 @@ impl std::ops::AddAssign for Counters {
         self.rays += other.rays;
         self.flights += other.flights;
         self.flights_proved += other.flights_proved;
+        self.lit_segments += other.lit_segments;
         self.paths += other.paths;
         self.refused += other.refused;
     }

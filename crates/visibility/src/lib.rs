@@ -37,6 +37,7 @@ mod build;
 mod counters;
 mod error;
 mod light;
+mod lit;
 mod method;
 mod progress;
 mod prover;
@@ -46,6 +47,7 @@ pub use build::{BuildReport, BuiltPart, LightReport, ProverOptions};
 pub use counters::Counters;
 pub use error::VisibilityError;
 pub use light::LightShape;
+pub use lit::{LitIntervals, MOST_TRIANGLES};
 pub use method::{FieldKind, Method, PointProver, UnknownMethod, method_table};
 pub use progress::{Progress, Quiet};
 pub use prover::{

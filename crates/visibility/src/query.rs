@@ -3,7 +3,7 @@
 use glam::DVec3;
 use vdf_geometry::{Bvh, Hit, Segment};
 
-use crate::{Answer, Counters, Provers};
+use crate::{Answer, Counters, LitIntervals, Provers};
 
 /// A question for [`Visibility::unoccluded`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +102,14 @@ impl<R: Recorder> Visibility<'_, R> {
             }
         }
         self.intersect(flight, counters)
+    }
+
+    /// Which parts of `segment` a point light at `light` sees. No method is asked, for the hierarchy answers for all of it at once.
+    #[inline]
+    #[must_use]
+    pub fn lit_intervals(&self, light: DVec3, segment: &Segment, counters: &mut Counters) -> LitIntervals {
+        counters.lit_segments += 1;
+        LitIntervals::new(self.bvh, light, segment)
     }
 
     /// Whether the closed segment of the query meets no occluder.

@@ -150,6 +150,7 @@ fn estimator_and_sampler_are_those_asked_for() {
         ("default", &[][..], "thesis", "independent"),
         ("thesis", &["--estimator", "thesis", "--sampler", "independent"], "thesis", "independent"),
         ("equiangular", &["--estimator", "equiangular"], "equiangular", "independent"),
+        ("lit", &["--estimator", "lit"], "lit", "independent"),
         ("sobol", &["--sampler", "sobol"], "thesis", "sobol"),
     ] {
         let (exr, json) = (format!("{name}.exr"), format!("{name}.json"));

@@ -23,7 +23,8 @@
 //! Segments that start far away are traced from their end or tested against all triangles, and nothing is culled by t.
 //!
 //! What a ray is before it comes to the tree is decided here; `space` is the tree's own space and its padding, `layout`
-//! what the tree is made of, `build` how it comes about, `traverse` the way of a ray, `leaf` the triangles at its end.
+//! what the tree is made of, `build` how it comes about, `traverse` the way of a ray, `leaf` the triangles at its end, `wedge` the way of
+//! all rays from a segment to a point at once.
 
 mod build;
 mod layout;
@@ -32,6 +33,9 @@ mod reinsert;
 mod slices;
 mod space;
 mod traverse;
+mod wedge;
+
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 
@@ -174,6 +178,13 @@ impl Bvh {
             visit(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
             TreeDistance::INFINITY
         });
+    }
+
+    /// Calls `visit` with every triangle that comes between `apex` and a point of `segment` ([`Segment::at`] for some t in [0, 1]), with some
+    /// others, in no particular order, until it breaks. A triangle comes between if the closed segment from the one to the other meets it.
+    #[inline]
+    pub fn visit_wedge(&self, apex: DVec3, segment: &Segment, visit: impl FnMut(&Triangle) -> ControlFlow<()>) {
+        self.tree.visit_wedge(apex, segment, self.space, visit);
     }
 
     /// All hits of a segment, without the tree.

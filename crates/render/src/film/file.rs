@@ -62,7 +62,7 @@ struct Header {
 
 /// [`Counters`], in the order of their declaration.
 #[derive(Serialize, Deserialize)]
-struct Counts([u64; 12]);
+struct Counts([u64; 13]);
 
 impl From<&Counters> for Counts {
     fn from(c: &Counters) -> Self {
@@ -78,6 +78,7 @@ impl From<&Counters> for Counts {
             rays,
             flights,
             flights_proved,
+            lit_segments,
             paths,
             refused,
         } = c;
@@ -92,6 +93,7 @@ impl From<&Counters> for Counts {
             rays,
             flights,
             flights_proved,
+            lit_segments,
             paths,
             refused,
         ])
@@ -101,7 +103,7 @@ impl From<&Counters> for Counts {
 impl From<Counts> for Counters {
     fn from(Counts(c): Counts) -> Self {
         let [queries, spatial, proved, on_light, on_light_proved, superficial_proved, proved_occluded, rays, ..] = c;
-        let [.., flights, flights_proved, paths, refused] = c;
+        let [.., flights, flights_proved, lit_segments, paths, refused] = c;
         Self {
             queries,
             spatial,
@@ -113,6 +115,7 @@ impl From<Counts> for Counters {
             rays,
             flights,
             flights_proved,
+            lit_segments,
             paths,
             refused,
         }

@@ -117,6 +117,10 @@ pub(super) struct Equiangular<const NODES: usize> {
     arcs: SmallVec<[Arc<NODES>; 2]>,
     /// ∫g over all arcs; 0 if nothing can be drawn.
     total: f64,
+    /// The least optical depth from the camera to the light, which all g are without.
+    least: f64,
+    /// How far g may be from what it stands for, at most; infinite if it is not known.
+    contrast: f64,
 }
 
 /// A stretch as seen from the light.
@@ -149,6 +153,8 @@ impl<const NODES: usize> Equiangular<NODES> {
         let least = stretches.iter().map(depth).fold(f64::INFINITY, f64::min);
         let mut arcs = SmallVec::new();
         let mut total = 0.0;
+        let mut contrast = if light.normal.is_some() { f64::INFINITY } else { 1.0_f64 };
+        let [mut nearest, mut farthest, mut densest] = [f64::INFINITY, 0.0_f64, 0.0_f64];
         for (i, stretch) in stretches.iter().enumerate() {
             let (begin, end) = (stretch.begin - foot, stretch.end - foot);
             let step = (gap * (end - begin)).atan2(gap * gap + begin * end) / Arc::<NODES>::CELLS as f64;
@@ -163,18 +169,44 @@ impl<const NODES: usize> Equiangular<NODES> {
             let r = gap.hypot(begin);
             let (mut cos, mut sin) = (gap / r, begin / r);
             let least_cos = gap / r.max(gap.hypot(end));
+            nearest = nearest.min(if begin < 0.0 && end > 0.0 { gap } else { r.min(gap.hypot(end)) });
+            farthest = farthest.max(gap / least_cos);
+            densest = densest.max(stretch.sigma_t);
+            let mut last: Option<[f64; 2]> = None;
             for value in &mut arc.values {
                 let r = gap / cos.max(least_cos);
                 let s = (r * sin).clamp(begin, end);
                 let through = (least - stretch.depth - stretch.sigma_t * ((s - begin) + r)).exp();
                 let at_light = if light.normal.is_some() { ((rise + slope * s) / r).max(0.0) } else { 1.0 };
-                *value = sigma_s * through * at_light * phase_at_cosine(stretch.phase, -sin);
+                let phase = phase_at_cosine(stretch.phase, -sin);
+                *value = sigma_s * through * at_light * phase;
+                if let Some([last_through, last_phase]) = last.replace([through, phase]) {
+                    // Both are monotone in between, so there their product is not beyond that of their extremes.
+                    let extremes = |a: f64, b: f64| a.max(b) / a.min(b);
+                    contrast = contrast.max(extremes(last_through, through) * extremes(last_phase, phase));
+                }
                 (cos, sin) = (cos * cos_step - sin * sin_step, sin * cos_step + cos * sin_step);
             }
             total += arc.area();
             arcs.push(arc);
         }
-        Self { foot, gap, arcs, total: if total.is_finite() { total } else { 0.0 } }
+        // Where there is another medium on the way to the light, the way's transmittance is misjudged.
+        contrast = contrast.max((densest * (farthest - nearest)).exp());
+        // A maximum passes over what is no number.
+        let contrast = if arcs.is_empty() || total > 0.0 { contrast } else { f64::INFINITY };
+        Self { foot, gap, arcs, total: if total.is_finite() { total } else { 0.0 }, least, contrast }
+    }
+
+    /// The contribution of the light, for an intensity of 1, if it saw all of the stretches; as far as g is close.
+    #[inline]
+    pub(super) fn worth(&self) -> f64 {
+        self.total * (-self.least).exp() / self.gap
+    }
+
+    /// How many times g may be as large, or as small, as what it stands for; infinite if that is not known.
+    #[inline]
+    pub(super) fn contrast(&self) -> f64 {
+        self.contrast
     }
 
     /// True if nothing can be drawn: the stretches are empty, or all behind the light.

@@ -3,6 +3,7 @@
 mod equiangular;
 mod glossy;
 mod kind;
+mod lit;
 mod mixture;
 mod raymarch;
 mod volpath;
@@ -115,7 +116,7 @@ impl<R: Recorder> Tracer<'_, R> {
         match integrator {
             Integrator::Volpath => match self.estimator {
                 Estimator::Thesis => self.volpath(ray, sampler, counters),
-                Estimator::Equiangular => self.volpath_by_mixture(ray, sampler, counters),
+                Estimator::Equiangular | Estimator::Lit => self.volpath_by_mixture(ray, sampler, counters),
             },
             Integrator::Raymarch { samples_per_segment } => self.raymarch(ray, samples_per_segment, sampler, counters),
         }
@@ -309,12 +310,17 @@ impl<R: Recorder> Tracer<'_, R> {
         if !self.visibility.unoccluded(&query, counters) {
             return None;
         }
+        Some((value * self.transmittance_to(point, light, regions, flight), light.pdf, pdf))
+    }
+
+    /// The estimate of the transmittance from a point in these regions to an emitter.
+    #[inline]
+    fn transmittance_to(&self, point: DVec3, light: &LightSample, regions: &RegionSet, flight: Option<f64>) -> f32 {
         let tau = self.world.media.optical_depth(&Segment::new(point, light.point), regions);
-        let transmittance = match flight {
+        match flight {
             None => to_f32((-tau).exp()),
             Some(flight) => f32::from(flight >= tau),
-        };
-        Some((value * transmittance, light.pdf, pdf))
+        }
     }
 
     /// Light of the background that a ray meets when it leaves the scene, weighted against emitter sampling.

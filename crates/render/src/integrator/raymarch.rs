@@ -20,7 +20,7 @@ use vdf_visibility::{Counters, Recorder};
 
 use super::{
     Path, PathRay, Tracer, Vertex, choose,
-    equiangular::{Equiangular, LightPlace, distance_at_depth, stretches},
+    equiangular::{Equiangular, LightPlace, Stretch, distance_at_depth, stretches},
     to_f32,
 };
 use crate::{
@@ -35,18 +35,19 @@ const TOWARDS_LIGHT: f64 = 0.75;
 const NODES: usize = 9;
 
 /// A ray through fog, up to the first surface.
-struct Fog<'a> {
-    free: &'a Segment,
-    direction: DVec3,
-    intervals: &'a MediumIntervals<'a>,
+pub(super) struct Fog<'a> {
+    pub(super) free: &'a Segment,
+    pub(super) direction: DVec3,
+    pub(super) intervals: &'a MediumIntervals<'a>,
     /// The optical depth of all of it, positive.
     tau: f64,
-    samples: u32,
+    pub(super) samples: u32,
 }
 
 impl<R: Recorder> Tracer<'_, R> {
     /// Radiance along `ray` by ray marching with `samples` strata a segment (at least 1).
     pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+        let lights = &self.world.lights;
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
             let (surface, free) = self.cast(&path.ray, counters);
@@ -56,7 +57,24 @@ impl<R: Recorder> Tracer<'_, R> {
                 let fog = Fog { free: &free, direction: path.ray.direction, intervals: &intervals, tau, samples };
                 let light = match self.estimator {
                     Estimator::Thesis => self.by_transmittance(&fog, sampler, counters),
-                    Estimator::Equiangular => self.towards_lights(&fog, sampler, counters),
+                    Estimator::Equiangular => self.towards_lights(
+                        &fog,
+                        &stretches(&intervals, &self.world.media),
+                        lights.all(),
+                        sampler,
+                        counters,
+                    ),
+                    Estimator::Lit => {
+                        let stretches = stretches(&intervals, &self.world.media);
+                        let mut light = Rgb::ZERO;
+                        if !lights.points().is_empty() {
+                            light += self.scattered_from_points(&fog, &stretches, sampler, counters);
+                        }
+                        if !lights.others().is_empty() {
+                            light += self.towards_lights(&fog, &stretches, lights.others(), sampler, counters);
+                        }
+                        light
+                    }
                 };
                 path.radiance += path.throughput * light;
             }
@@ -90,10 +108,16 @@ impl<R: Recorder> Tracer<'_, R> {
         sum * to_f32(width)
     }
 
-    /// Emitted light scattered once into the ray, from distances drawn towards a light or by transmittance.
-    fn towards_lights(&self, fog: &Fog<'_>, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+    /// Light of these emitters scattered once into the ray, from distances drawn towards one of them or by transmittance.
+    fn towards_lights(
+        &self,
+        fog: &Fog<'_>,
+        stretches: &[Stretch],
+        emitters: &[usize],
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
         let lights = &self.world.lights;
-        let stretches = stretches(fog.intervals, &self.world.media);
         let scattered = -(-fog.tau).exp_m1();
         let u_place = sampler.next_2d();
         let mut known: Option<(usize, Equiangular<NODES>)> = None;
@@ -104,14 +128,15 @@ impl<R: Recorder> Tracer<'_, R> {
             }
             let u = (f64::from(k) + sampler.next_1d()) / f64::from(fog.samples);
             let flight = self.flight_to_emitter(sampler);
-            let Some((emitter, u)) = choose(u, lights.count()) else { break };
+            let Some((i, u)) = choose(u, emitters.len()) else { break };
+            let emitter = emitters[i];
             let Some(place) = lights.sample_point(emitter, rotated(u_place, k)) else { continue };
             let towards = match lights.position(&place) {
                 None => None,
                 Some((position, normal)) => {
                     if known.as_ref().is_none_or(|(of, _)| *of != emitter || lights.point_position(emitter).is_none()) {
                         let place = LightPlace { position, normal };
-                        known = Some((emitter, Equiangular::new(fog.free.p, fog.direction, &stretches, &place)));
+                        known = Some((emitter, Equiangular::new(fog.free.p, fog.direction, stretches, &place)));
                     }
                     known.as_ref().map(|(_, towards)| towards).filter(|towards| !towards.is_empty())
                 }
@@ -119,7 +144,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let share = if towards.is_some() { TOWARDS_LIGHT } else { 0.0 };
             let drawn = match towards {
                 Some(towards) if u < share => towards.sample(u / share),
-                _ => distance_at_depth(&stretches, -(-(u - share) / (1.0 - share) * scattered).ln_1p()),
+                _ => distance_at_depth(stretches, -(-(u - share) / (1.0 - share) * scattered).ln_1p()),
             };
             let Some((i, distance)) = drawn else { continue };
             let stretch = &stretches[i];
@@ -141,7 +166,8 @@ impl<R: Recorder> Tracer<'_, R> {
                 }
             }
         }
-        sum / fog.samples as f32
+        // An emitter's weight is for one of all.
+        sum * (emitters.len() as f32 / lights.count() as f32) / fog.samples as f32
     }
 }
 

@@ -13,6 +13,11 @@ use self::area::{AreaLight, AreaPoint};
 #[derive(Debug)]
 pub struct Lights {
     lights: Vec<Light>,
+    /// The number, position and intensity of each that is a point.
+    points: Vec<(usize, DVec3, Rgb)>,
+    /// The numbers of all, and of those that are no points.
+    all: Vec<usize>,
+    others: Vec<usize>,
     /// Radiance from outside the scene; black without a `constant` emitter.
     background: Rgb,
     /// How far a direction is followed before it is infinitely far away, in world units.
@@ -71,7 +76,7 @@ impl Lights {
     #[must_use]
     pub fn new(scene: &Scene, reach: f64) -> Self {
         let mut background = Rgb::ZERO;
-        let lights = scene
+        let lights: Vec<_> = scene
             .emitters
             .iter()
             .map(|e| match *e {
@@ -86,7 +91,13 @@ impl Lights {
                 }
             })
             .collect();
-        Self { lights, background, reach }
+        let point = |(i, light): (usize, &Light)| match *light {
+            Light::Point { position, intensity } => Some((i, position, intensity)),
+            _ => None,
+        };
+        let points: Vec<_> = lights.iter().enumerate().filter_map(point).collect();
+        let others = (0..lights.len()).filter(|i| points.iter().all(|(point, ..)| point != i)).collect();
+        Self { all: (0..lights.len()).collect(), lights, points, others, background, reach }
     }
 
     /// Radiance of a ray that leaves the scene.
@@ -110,6 +121,24 @@ impl Lights {
     #[inline]
     pub(crate) const fn count(&self) -> usize {
         self.lights.len()
+    }
+
+    /// The number, position and intensity of each emitter that is a point.
+    #[inline]
+    pub(crate) fn points(&self) -> &[(usize, DVec3, Rgb)] {
+        &self.points
+    }
+
+    /// The numbers of all emitters.
+    #[inline]
+    pub(crate) fn all(&self) -> &[usize] {
+        &self.all
+    }
+
+    /// The numbers of those that are no points.
+    #[inline]
+    pub(crate) fn others(&self) -> &[usize] {
+        &self.others
     }
 
     /// Draws a place on an emitter. `None` if it has none.

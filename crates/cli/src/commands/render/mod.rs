@@ -225,6 +225,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         estimator: match args.estimator {
             EstimatorName::Thesis => Estimator::Thesis,
             EstimatorName::Equiangular => Estimator::Equiangular,
+            EstimatorName::Lit => Estimator::Lit,
         },
         sampler: match args.sampler {
             SamplerName::Independent => SamplerKind::Independent,
