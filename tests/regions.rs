@@ -78,7 +78,7 @@ fn floor(fog_from: f32, place: Place, emitter: &str) -> Scene {
         place.triangles(t)
     };
     let grey = Rgb::splat(0.8);
-    let bsdf = Bsdf::Diffuse { front: grey, back: grey };
+    let bsdf = Bsdf { front: grey, back: grey };
     scene.surfaces.push(Surface { triangles: square(5.0, 0.0, true), bsdf, radiance: None });
     let fog = add_medium(&mut scene, SIGMA_T, 0.0, Phase::Isotropic);
     scene.sensor.medium = Some(fog);
@@ -92,7 +92,7 @@ fn floor(fog_from: f32, place: Place, emitter: &str) -> Scene {
             // A small lamp, 0.02 wide, in the plane of the fog's upper face.
             let lamp = Surface {
                 triangles: square(0.01, 3.0, false),
-                bsdf: Bsdf::Diffuse { front: Rgb::ZERO, back: Rgb::ZERO },
+                bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
                 radiance: Some(Rgb::splat(1e4)),
             };
             scene.emitters.push(Emitter::Area { surface: scene.surfaces.len() });
@@ -181,7 +181,7 @@ fn a_flush_room_is_a_white_furnace() {
             let half = Rgb::splat(0.5);
             scene.surfaces.push(Surface {
                 triangles: walls,
-                bsdf: Bsdf::Diffuse { front: half, back: Rgb::ZERO },
+                bsdf: Bsdf { front: half, back: Rgb::ZERO },
                 radiance: Some(half),
             });
             scene.emitters.push(Emitter::Area { surface: 0 });
@@ -209,11 +209,7 @@ fn a_sheet_has_two_sides() {
     for (fog_is_before, depth) in [(false, 0.0_f64), (true, 0.5 * (1.0 + 1.5))] {
         let mut scene = empty_scene(4, 16, 1e-6);
         let one = Rgb::ONE;
-        scene.surfaces.push(Surface {
-            triangles: sheet.clone(),
-            bsdf: Bsdf::Diffuse { front: one, back: one },
-            radiance: None,
-        });
+        scene.surfaces.push(Surface { triangles: sheet.clone(), bsdf: Bsdf { front: one, back: one }, radiance: None });
         let medium = add_medium(&mut scene, 0.5, 0.0, Phase::Isotropic);
         let (z0, z1) = if fog_is_before { (0.5, 2.0) } else { (2.0, 4.0) };
         let triangles = cuboid(vec3(-5.0, -5.0, z0), vec3(5.0, 5.0, z1));
@@ -289,7 +285,7 @@ fn two_skies_are_their_sum() {
 fn no_light_leaks_into_a_closed_room() {
     let mut scene = empty_scene(8, 16, 0.7);
     scene.sensor.world_from_camera = DMat4::from_translation(dvec3(2.0, 2.0, 2.0));
-    let bsdf = Bsdf::Diffuse { front: Rgb::ONE, back: Rgb::ONE };
+    let bsdf = Bsdf { front: Rgb::ONE, back: Rgb::ONE };
     scene.surfaces.push(Surface { triangles: cuboid(Vec3::ZERO, Vec3::splat(5.0)), bsdf, radiance: None });
     scene.emitters.push(Emitter::Point { position: dvec3(0.0, 1.5e11, 0.0), intensity: Rgb::splat(1e23) });
     for method in [Method::NONE, Method::default()] {
@@ -353,7 +349,7 @@ impl Progress for StopAfter {
 #[test]
 fn endless_paths_can_be_stopped() {
     let mut scene = empty_scene(1, 1, 0.7);
-    let bsdf = Bsdf::Diffuse { front: Rgb::ONE, back: Rgb::ONE };
+    let bsdf = Bsdf { front: Rgb::ONE, back: Rgb::ONE };
     scene.surfaces.push(Surface { triangles: cuboid(Vec3::NEG_ONE, Vec3::ONE), bsdf, radiance: None });
     scene.emitters.push(Emitter::Point { position: dvec3(0.5, 0.5, 0.5), intensity: Rgb::ONE });
     let fog = add_medium(&mut scene, 1.0, 1.0, Phase::Isotropic);

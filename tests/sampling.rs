@@ -196,7 +196,7 @@ fn lit() -> Scene {
     };
     let area = |triangles, radiance| Surface {
         triangles,
-        bsdf: Bsdf::Diffuse { front: Rgb::ZERO, back: Rgb::ZERO },
+        bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
         radiance: Some(Rgb::splat(radiance)),
     };
     scene.surfaces.push(area(

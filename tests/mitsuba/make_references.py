@@ -90,8 +90,6 @@ PLAN = [
     Case("nested", -1, 128, 256),
     Case("rock", 2, 128, 256),
     Case("rock", 8, 128, 256),
-    Case("metals", -1, 64, 256),
-    Case("glass", -1, 64, 256),
     Case("cropped", 3, 128, 256, border=4, pixels_are_independent=False),
 ]
 

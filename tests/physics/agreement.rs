@@ -32,7 +32,7 @@ fn scene(reflectance: f32, albedo: f32, density: f64) -> Scene {
     add_fogs(&mut scene, &fogs);
     let surface = |triangles, radiance| Surface {
         triangles,
-        bsdf: Bsdf::Diffuse { front: Rgb::splat(reflectance), back: Rgb::splat(reflectance) },
+        bsdf: Bsdf { front: Rgb::splat(reflectance), back: Rgb::splat(reflectance) },
         radiance,
     };
     scene.surfaces.push(surface(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));

@@ -24,7 +24,7 @@ fn analog_is_all_or_nothing() {
     let mut scene = empty_scene(256, 1, 1e-9);
     scene.surfaces.push(Surface {
         triangles: vec![Triangle::new(vec3(-9.0, -9.0, 2.0), vec3(9.0, -9.0, 2.0), vec3(0.0, 9.0, 2.0))],
-        bsdf: Bsdf::Diffuse { front: Rgb::splat(0.5), back: Rgb::splat(0.5) },
+        bsdf: Bsdf { front: Rgb::splat(0.5), back: Rgb::splat(0.5) },
         radiance: None,
     });
     scene.emitters.push(Emitter::Point { position: light, intensity: Rgb::splat(2.0) });
@@ -57,7 +57,7 @@ fn body_in_fog() -> Scene {
     add_fog(&mut scene, vec3(-1.5, -1.5, 0.5), vec3(1.5, 1.5, 4.0), fog);
     let surface = |triangles, radiance| Surface {
         triangles,
-        bsdf: Bsdf::Diffuse { front: Rgb::splat(0.7), back: Rgb::splat(0.7) },
+        bsdf: Bsdf { front: Rgb::splat(0.7), back: Rgb::splat(0.7) },
         radiance,
     };
     scene.surfaces.push(surface(cuboid(vec3(-0.4, -1.4, 2.0), vec3(0.5, 0.2, 2.6)), None));

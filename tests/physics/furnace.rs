@@ -25,7 +25,7 @@ fn nothing_is_lost_under_a_uniform_sky() {
             add_fog(&mut scene, vec3(-2.0, -2.0, 1.0), vec3(2.0, 2.0, 4.0), fog);
             scene.surfaces.push(Surface {
                 triangles: cuboid(vec3(-0.5, -0.5, 2.0), vec3(0.7, 0.4, 3.0)),
-                bsdf: Bsdf::Diffuse { front: Rgb::ONE, back: Rgb::ONE },
+                bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
                 radiance: None,
             });
             check.mean(&format!("{phase:?}"), &check.render(&scene, 32), 1.0);
@@ -47,7 +47,7 @@ fn room(emitted: f32, reflectance: f32, one_wall_only: bool) -> Scene {
         inwards.partition(|t| !one_wall_only || t.vertices.iter().all(|v| v.z == 1.5));
     let surface = |triangles, reflectance, radiance| Surface {
         triangles,
-        bsdf: Bsdf::Diffuse { front: Rgb::splat(reflectance), back: Rgb::ZERO },
+        bsdf: Bsdf { front: Rgb::splat(reflectance), back: Rgb::ZERO },
         radiance,
     };
     scene.surfaces.push(surface(emitting, reflectance, Some(Rgb::splat(emitted))));
@@ -104,7 +104,7 @@ fn a_cavity_is_uniform() {
             // The camera looks away from the black wall, then at it; a white body is in its way.
             let body = Surface {
                 triangles: cuboid(vec3(-0.5, -0.6, -0.8), vec3(0.1, 0.2, -0.4)),
-                bsdf: Bsdf::Diffuse { front: Rgb::ONE, back: Rgb::ONE },
+                bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
                 radiance: None,
             };
             scene.surfaces.push(body);

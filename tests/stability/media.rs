@@ -196,7 +196,7 @@ fn case_40_channels_that_are_zero() {
     let make = |[albedo, reflectance, intensity]: [Rgb; 3]| {
         let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
         scene.media[0].albedo = albedo;
-        scene.surfaces.iter_mut().for_each(|s| s.bsdf = Bsdf::Diffuse { front: reflectance, back: reflectance });
+        scene.surfaces.iter_mut().for_each(|s| s.bsdf = Bsdf { front: reflectance, back: reflectance });
         scene.emitters = vec![Emitter::Point { position: dvec3(2.0, 6.0, 3.0), intensity }];
         scene.integrator = IntegratorSettings { max_depth: Some(6), rr_depth: 100 };
         scene
@@ -317,7 +317,7 @@ fn case_44_tiny_and_huge_emitters() {
             [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]: [f32; 2]| vec3(x * half, y * half, z));
         scene.surfaces.push(Surface {
             triangles: vec![Triangle::new(a, b, c), Triangle::new(a, c, d)],
-            bsdf: Bsdf::Diffuse { front: Rgb::ZERO, back: Rgb::ZERO },
+            bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
             radiance: Some(Rgb::splat(0.5 / (half * half).min(1.0))),
         });
         scene.emitters.push(Emitter::Area { surface: 1 });

@@ -67,7 +67,7 @@ fn degenerate_and_duplicated_triangles() {
     let doubles: Vec<_> = scene.surfaces[0].triangles.clone();
     scene.surfaces.push(Surface {
         triangles: doubles,
-        bsdf: Bsdf::Diffuse { front: Rgb::ZERO, back: Rgb::ONE },
+        bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ONE },
         radiance: None,
     });
     for (a, b) in same_for_all_methods("with doubles", &scene, 1.0).iter().zip(&reference) {

@@ -5,7 +5,7 @@ use vdf_geometry::{Bounds, Bvh, Hit, Triangle};
 use vdf_scene::{Bsdf, Emitter, Rgb, Scene};
 use vdf_visibility::LightShape;
 
-use crate::{GridExtent, bsdf::Glossy, lights::Lights, media::Media};
+use crate::{GridExtent, lights::Lights, media::Media};
 
 /// What the integrators need of a scene. Immutable and shared by all threads.
 #[derive(Debug)]
@@ -26,16 +26,11 @@ pub struct World {
     pub(crate) far_plane_clips: bool,
     surface_of_triangle: Vec<u32>,
     surfaces: Vec<SurfaceData>,
-    /// How the surfaces scatter that are not diffuse.
-    glossy: Vec<Glossy>,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct SurfaceData {
-    /// Reflectances of the side of the normal and of the other; black where a surface is not diffuse.
-    diffuse: [Rgb; 2],
-    /// Number of how it scatters, if it is not diffuse.
-    glossy: Option<u32>,
+    bsdf: Bsdf,
     radiance: Rgb,
     /// Number of the area emitter, if it is one.
     emitter: Option<usize>,
@@ -54,17 +49,6 @@ pub struct SurfacePoint {
     pub emitted: Rgb,
     /// Number of the area emitter, if it is one.
     pub emitter: Option<usize>,
-    /// Number of how it scatters, if it is not diffuse, and whether this is the side of its normal.
-    pub(crate) glossy: Option<(u32, bool)>,
-    /// How far the point is lifted off the surface.
-    pub(crate) lift: f64,
-}
-
-impl SurfacePoint {
-    /// The same point on the other side.
-    pub(crate) fn behind(&self) -> DVec3 {
-        self.point - self.normal * (2.0 * self.lift)
-    }
 }
 
 impl World {
@@ -73,18 +57,10 @@ impl World {
     pub fn new(scene: &Scene) -> Self {
         let triangles: Vec<_> = scene.surfaces.iter().flat_map(|s| s.triangles.iter().copied()).collect();
         let surface_of_triangle = (0..).zip(&scene.surfaces).flat_map(|(i, s)| vec![i; s.triangles.len()]).collect();
-        let mut glossy = Vec::new();
         let mut surfaces: Vec<_> = scene
             .surfaces
             .iter()
-            .map(|s| {
-                let diffuse = if let Bsdf::Diffuse { front, back } = s.bsdf { [front, back] } else { [Rgb::ZERO; 2] };
-                let number = Glossy::new(&s.bsdf).map(|how| {
-                    glossy.push(how);
-                    u32::try_from(glossy.len() - 1).unwrap_or(u32::MAX)
-                });
-                SurfaceData { diffuse, glossy: number, radiance: s.radiance.unwrap_or(Rgb::ZERO), emitter: None }
-            })
+            .map(|s| SurfaceData { bsdf: s.bsdf, radiance: s.radiance.unwrap_or(Rgb::ZERO), emitter: None })
             .collect();
         for (i, emitter) in scene.emitters.iter().enumerate() {
             if let Emitter::Area { surface } = emitter {
@@ -106,7 +82,6 @@ impl World {
             bounds,
             surface_of_triangle,
             surfaces,
-            glossy,
         }
     }
 
@@ -117,12 +92,6 @@ impl World {
             GridExtent::Occluders => &self.occluder_bounds,
             GridExtent::Scene => &self.bounds,
         }
-    }
-
-    /// How a surface with this number scatters.
-    #[inline]
-    pub(crate) fn glossy(&self, number: u32) -> &Glossy {
-        &self.glossy[number as usize]
     }
 
     /// The surface at a hit, for a ray of direction `direction`.
@@ -137,13 +106,10 @@ impl World {
         let data = &self.surfaces[self.surface_of_triangle[hit.triangle as usize] as usize];
         let front = direction.dot(normal) < 0.0;
         let normal = if front { normal } else { -normal };
-        let lift = lift(triangle);
         SurfacePoint {
-            point: a * wa + b * wb + c * wc + normal * lift,
+            point: a * wa + b * wb + c * wc + normal * lift(triangle),
             normal,
-            glossy: data.glossy.map(|number| (number, front)),
-            lift,
-            reflectance: data.diffuse[usize::from(!front)],
+            reflectance: if front { data.bsdf.front } else { data.bsdf.back },
             emitted: if front { data.radiance } else { Rgb::ZERO },
             emitter: data.emitter,
         }

@@ -4,8 +4,8 @@ use glam::DVec3;
 use vdf_geometry::Triangle;
 
 use crate::{
-    Boundary, Bsdf, Conductor, Dielectric, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, Microfacets,
-    PerspectiveSensor, Phase, PixelRect, Plastic, ReconstructionFilter, Rgb, Roughness, Scene, Surface,
+    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
+    ReconstructionFilter, Rgb, Scene, Surface,
 };
 
 impl Scene {
@@ -87,45 +87,12 @@ impl Sum {
         }
     }
 
-    fn surface(&mut self, Surface { triangles, bsdf, radiance }: &Surface) {
+    fn surface(&mut self, Surface { triangles, bsdf: Bsdf { front, back }, radiance }: &Surface) {
         self.triangles(triangles);
-        self.bsdf(bsdf);
+        self.colour(*front);
+        self.colour(*back);
         self.words(&[u32::from(radiance.is_some())]);
         self.colour(radiance.unwrap_or_default());
-    }
-
-    fn bsdf(&mut self, bsdf: &Bsdf) {
-        match *bsdf {
-            Bsdf::Diffuse { front, back } => {
-                self.words(&[0]);
-                self.colour(front);
-                self.colour(back);
-            }
-            Bsdf::Conductor(Conductor { eta, k, specular_reflectance, roughness, two_sided }) => {
-                self.words(&[1, u32::from(two_sided), u32::from(roughness.is_some())]);
-                [eta, k, specular_reflectance].into_iter().for_each(|c| self.colour(c));
-                roughness.iter().for_each(|r| self.roughness(r));
-            }
-            Bsdf::Dielectric(Dielectric { eta, specular_reflectance, specular_transmittance, roughness }) => {
-                self.words(&[2, u32::from(roughness.is_some())]);
-                self.doubles(&[eta]);
-                [specular_reflectance, specular_transmittance].into_iter().for_each(|c| self.colour(c));
-                roughness.iter().for_each(|r| self.roughness(r));
-            }
-            Bsdf::Plastic(Plastic { eta, diffuse_reflectance, specular_reflectance, nonlinear, two_sided }) => {
-                self.words(&[3, u32::from(nonlinear), u32::from(two_sided)]);
-                self.doubles(&[eta]);
-                [diffuse_reflectance, specular_reflectance].into_iter().for_each(|c| self.colour(c));
-            }
-        }
-    }
-
-    fn roughness(&mut self, Roughness { alpha, distribution }: &Roughness) {
-        self.words(&[match distribution {
-            Microfacets::Beckmann => 0,
-            Microfacets::Ggx => 1,
-        }]);
-        self.doubles(&[*alpha]);
     }
 
     fn boundary(&mut self, Boundary { triangles, interior, exterior }: &Boundary) {

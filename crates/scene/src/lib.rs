@@ -35,9 +35,8 @@ mod text;
 pub use error::SceneError;
 pub use load::LoadOptions;
 pub use model::{
-    Boundary, Bsdf, ComponentFormat, Conductor, Dielectric, Emitter, FilmSettings, IntegratorSettings, Medium,
-    MediumId, Microfacets, PerspectiveSensor, Phase, PixelRect, Plastic, ReconstructionFilter, Roughness, Scene,
-    Surface,
+    Boundary, Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor,
+    Phase, PixelRect, ReconstructionFilter, Scene, Surface,
 };
 pub use source::{EmbeddedFile, SceneSource};
 

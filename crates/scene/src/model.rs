@@ -46,85 +46,15 @@ pub struct Surface {
     pub radiance: Option<Rgb>,
 }
 
-/// How a surface scatters light. Whatever it is, the surface is an occluder: shadow segments end on glass, as in Mitsuba 3.
+/// A Lambertian reflector, each side with its own reflectance; black where a side does not reflect.
+///
+/// Mitsuba's `diffuse` has a black back; `twosided` puts a `diffuse` on each side.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bsdf {
-    /// A Lambertian reflector, each side with its own reflectance; black where a side does not reflect.
-    ///
-    /// Mitsuba's `diffuse` has a black back; `twosided` puts a `diffuse` on each side.
-    Diffuse {
-        /// Reflectance of the side of the normal, each channel in [0, 1].
-        front: Rgb,
-        /// Reflectance of the other side, each channel in [0, 1].
-        back: Rgb,
-    },
-    /// A metal.
-    Conductor(Conductor),
-    /// Glass, or another clear body.
-    Dielectric(Dielectric),
-    /// A diffuse ground under a clear coat.
-    Plastic(Plastic),
-}
-
-/// Mitsuba's `conductor` and `roughconductor`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conductor {
-    /// Real part of the index of refraction, relative to what is outside; 0 in all channels, with k = 1, is a perfect mirror.
-    pub eta: Rgb,
-    /// Imaginary part, the absorption.
-    pub k: Rgb,
-    /// Factor of what is reflected, 1 for physical accuracy.
-    pub specular_reflectance: Rgb,
-    /// `None` is smooth: a mirror.
-    pub roughness: Option<Roughness>,
-    /// Whether the back reflects, too.
-    pub two_sided: bool,
-}
-
-/// Mitsuba's `dielectric` and `roughdielectric`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dielectric {
-    /// Index of refraction behind the surface over that in front of it; positive.
-    pub eta: f64,
-    /// Factor of what is reflected, 1 for physical accuracy.
-    pub specular_reflectance: Rgb,
-    /// Factor of what passes, 1 for physical accuracy.
-    pub specular_transmittance: Rgb,
-    /// `None` is smooth.
-    pub roughness: Option<Roughness>,
-}
-
-/// Mitsuba's `plastic`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plastic {
-    /// Index of refraction of the coat over that in front of it; positive.
-    pub eta: f64,
-    /// Reflectance of the ground, each channel in [0, 1].
-    pub diffuse_reflectance: Rgb,
-    /// Factor of what the coat reflects, 1 for physical accuracy.
-    pub specular_reflectance: Rgb,
-    /// Whether colours shift by the reflections inside of the coat.
-    pub nonlinear: bool,
-    /// Whether the back reflects, too.
-    pub two_sided: bool,
-}
-
-/// A surface of microfacets, the same in all directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Roughness {
-    /// The slopes' root mean square; positive.
-    pub alpha: f64,
-    /// How the facets' normals are distributed.
-    pub distribution: Microfacets,
-}
-
-/// The distributions of microfacets' normals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Microfacets {
-    /// Normally distributed slopes.
-    Beckmann,
-    /// Trowbridge and Reitz, with a long tail.
-    Ggx,
+pub struct Bsdf {
+    /// Reflectance of the side of the normal, each channel in [0, 1].
+    pub front: Rgb,
+    /// Reflectance of the other side, each channel in [0, 1].
+    pub back: Rgb,
 }
 
 /// A surface between two media, index-matched: light passes it unchanged.

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use vdf_scene::{Bsdf, LoadOptions, Phase, ReconstructionFilter, Rgb, Scene};
+use vdf_scene::{LoadOptions, Phase, ReconstructionFilter, Rgb, Scene};
 use vdf_scenes::builtin;
 
 fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
@@ -25,16 +25,8 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
-        |s| {
-            if let Bsdf::Diffuse { front, .. } = &mut s.surfaces[0].bsdf {
-                front.y = 0.125
-            }
-        },
-        |s| {
-            if let Bsdf::Diffuse { back, .. } = &mut s.surfaces[0].bsdf {
-                back.y = 0.125
-            }
-        },
+        |s| s.surfaces[0].bsdf.front.y = 0.125,
+        |s| s.surfaces[0].bsdf.back.y = 0.125,
         |s| s.surfaces[0].radiance = Some(Rgb::ZERO),
         |s| drop(s.surfaces.pop()),
         |s| s.boundaries[0].interior = None,

@@ -21,7 +21,7 @@ fn scene() -> Scene {
                 Triangle::new(v(0.0, 0.0), v(1.0, 0.0), v(1.0, 1.0)),
                 Triangle::new(v(0.0, 0.0), v(1.0, 1.0), v(0.0, 1.0)),
             ],
-            bsdf: Bsdf::Diffuse { front: white, back: white },
+            bsdf: Bsdf { front: white, back: white },
             radiance: None,
         }],
         boundaries: vec![],

@@ -101,12 +101,6 @@ impl<R: Recorder> Tracer<'_, R> {
                 }
                 Event::Arrival { surface, regions } => {
                     let Some(surface) = self.light_at_end(&mut path, surface) else { break };
-                    if let Some(glossy) = surface.glossy {
-                        if self.scatter_glossily(&mut path, &surface, glossy, regions, sampler, counters) {
-                            continue;
-                        }
-                        break;
-                    }
                     let vertex = Vertex::OnSurface(surface);
                     let u = sampler.next_1d();
                     let mixture = match media.medium_in(&regions) {

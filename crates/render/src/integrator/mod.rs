@@ -1,7 +1,6 @@
 //! The integrators, and what they share: next-event estimation and multiple importance sampling.
 
 mod equiangular;
-mod glossy;
 mod kind;
 mod lit;
 mod mixture;
@@ -49,8 +48,8 @@ pub(crate) struct PathRay {
 /// How the last event drew the ray's direction.
 #[derive(Clone, Copy, Debug)]
 enum Origin {
-    /// The camera, a mirror or smooth glass: no emitter sampling competes.
-    Certain,
+    /// The camera: no emitter sampling competes.
+    Camera,
     /// A scattering event at `point` that drew the direction with density `pdf` and also sampled the emitters.
     Scattering { point: DVec3, pdf: f64 },
 }
@@ -73,9 +72,6 @@ struct Path {
     /// The part of the throughput that is there only because the path was drawn from mixtures: small where light is expected. Roulette leaves it
     /// alone, or it would kill what was just aimed at the light.
     aim: f64,
-    /// The square of the index of refraction where the path is, over that at the camera: by so much the throughput fell only because
-    /// radiance is compressed. Roulette leaves that alone.
-    eta2: f32,
     /// Light gathered so far.
     radiance: Rgb,
 }
@@ -84,13 +80,12 @@ impl Path {
     fn new(ray: PathRay) -> Self {
         Self {
             ray,
-            origin: Origin::Certain,
+            origin: Origin::Camera,
             on_surface: false,
             depth: 0,
             crossings: 0,
             throughput: Rgb::ONE,
             aim: 1.0,
-            eta2: 1.0,
             radiance: Rgb::ZERO,
         }
     }
@@ -189,9 +184,6 @@ impl<R: Recorder> Tracer<'_, R> {
         counters: &mut Counters,
     ) -> bool {
         let Some(surface) = self.light_at_end(path, surface) else { return false };
-        if let Some(glossy) = surface.glossy {
-            return self.scatter_glossily(path, &surface, glossy, regions, sampler, counters);
-        }
         let vertex = Vertex::OnSurface(surface);
         path.radiance += path.throughput * self.direct_light(surface.point, &vertex, &regions, sampler, counters);
         let (direction, pdf) = sample_diffuse(surface.normal, sampler.next_2d());
@@ -281,31 +273,16 @@ impl<R: Recorder> Tracer<'_, R> {
         flight: Option<f64>,
         counters: &mut Counters,
     ) -> Option<(Rgb, f64, f64)> {
+        let (value, pdf) = vertex.eval(light.direction);
+        let value = value * light.weight;
+        if value.max_element() <= 0.0 {
+            return None;
+        }
         let kind = match vertex {
             Vertex::InMedium { .. } if light.on_surface => QueryKind::OnLight,
             Vertex::InMedium { .. } => QueryKind::Spatial,
             Vertex::OnSurface(_) => QueryKind::Superficial,
         };
-        self.connect_as(kind, point, vertex.eval(light.direction), regions, light, flight, counters)
-    }
-
-    /// As [`Tracer::connect`], for what a vertex scatters to the emitter and the density of its own sampling.
-    #[inline]
-    #[allow(clippy::too_many_arguments, reason = "what an event has and what a path has")]
-    fn connect_as(
-        &self,
-        kind: QueryKind,
-        point: DVec3,
-        (value, pdf): (Rgb, f64),
-        regions: &RegionSet,
-        light: &LightSample,
-        flight: Option<f64>,
-        counters: &mut Counters,
-    ) -> Option<(Rgb, f64, f64)> {
-        let value = value * light.weight;
-        if value.max_element() <= 0.0 {
-            return None;
-        }
         let query = ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind };
         if !self.visibility.unoccluded(&query, counters) {
             return None;
@@ -424,7 +401,7 @@ fn survives(path: &mut Path, roulette: Roulette, rr_depth: u32, sampler: &mut Sa
         return true;
     }
     let endless = thesis || path.on_surface || path.depth > MANY_EVENTS || path.ray.regions.is_empty();
-    let worth = path.throughput.max_element() * path.eta2 / to_f32(path.aim);
+    let worth = path.throughput.max_element() / to_f32(path.aim);
     let q = worth.min(if endless { MAX_SURVIVAL } else { 1.0 });
     if sampler.next_1d() >= f64::from(q) {
         return false;

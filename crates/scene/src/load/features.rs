@@ -16,9 +16,7 @@ const MOST_NAMED: usize = 12;
 /// The plugins that are read for objects of that tag.
 pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
     match tag {
-        "bsdf" => {
-            &["diffuse", "twosided", "null", "conductor", "roughconductor", "dielectric", "roughdielectric", "plastic"]
-        }
+        "bsdf" => &["diffuse", "twosided", "null"],
         "emitter" => &["point", "constant", "area"],
         "film" => &["hdrfilm"],
         "integrator" => {

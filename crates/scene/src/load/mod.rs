@@ -7,7 +7,6 @@ mod features;
 mod film;
 mod integrator;
 mod lines;
-mod materials;
 mod names;
 mod objects;
 mod parameters;
@@ -19,8 +18,6 @@ mod shapes;
 mod tests;
 #[cfg(test)]
 mod tests_hostile;
-#[cfg(test)]
-mod tests_materials;
 #[cfg(test)]
 mod tests_mitsuba;
 mod transform;
@@ -133,7 +130,7 @@ impl<'a> Loader<'a> {
                 "shape" => shapes::read(&mut self, element)?,
                 "medium" => drop(objects::medium(&mut self, element)?),
                 // Read where they are used; here only checked, so that an unused one cannot hide a mistake.
-                "bsdf" => drop(materials::bsdf(&self, element)?),
+                "bsdf" => drop(objects::bsdf(&self, element)?),
                 "phase" => drop(objects::phase(&self, element)?),
                 "emitter" => {
                     let Some(emitter) = objects::emitter(&self, element)? else { continue };

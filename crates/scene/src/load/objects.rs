@@ -1,9 +1,9 @@
-//! Media and emitters.
+//! Media, BSDFs and emitters.
 
 use super::document::Element;
 use super::properties::Object;
 use super::{Loader, features};
-use crate::{Emitter, Medium, MediumId, Phase};
+use crate::{Bsdf, Emitter, Medium, MediumId, Phase};
 use crate::{Rgb, SceneError};
 
 /// The medium's index; each is read once, however often it is referred to.
@@ -46,6 +46,41 @@ pub(super) fn phase<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Pha
     };
     object.finish()?;
     Ok(phase)
+}
+
+/// What a shape without a BSDF has.
+pub(super) fn default_bsdf(emits: bool) -> Bsdf {
+    Bsdf { front: Rgb::splat(if emits { 0.0 } else { 0.5 }), back: Rgb::ZERO }
+}
+
+/// A BSDF; `None` is `null`.
+pub(super) fn bsdf<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Bsdf>, SceneError> {
+    let mut object = Object::new(loader, element, features::kinds("bsdf"))?;
+    let bsdf = match object.kind() {
+        "diffuse" => Some(Bsdf { front: object.reflectance("reflectance", 0.5)?, back: Rgb::ZERO }),
+        "twosided" => {
+            let nested = object.nested("bsdf");
+            let (front, back) = match nested.as_slice() {
+                [both] => (both, both),
+                [front, back] => (front, back),
+                other => {
+                    return Err(object
+                        .error(format!("{} nested BSDFs", other.len()), "nest one diffuse, or two: front and back"));
+                }
+            };
+            Some(Bsdf { front: diffuse(loader, front.object)?, back: diffuse(loader, back.object)? })
+        }
+        _ => None,
+    };
+    object.finish()?;
+    Ok(bsdf)
+}
+
+fn diffuse<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneError> {
+    let mut object = Object::new(loader, element, &["diffuse"])?;
+    let reflectance = object.reflectance("reflectance", 0.5)?;
+    object.finish()?;
+    Ok(reflectance)
 }
 
 /// An emitter that stands by itself; `None` for an area light, which shines where a shape refers to it.

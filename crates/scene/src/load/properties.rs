@@ -197,20 +197,6 @@ impl<'a> Object<'a> {
         self.colour(name, default, 1.0, DVec3::ONE)
     }
 
-    /// A colour without an upper bound.
-    pub(super) fn at_least_0(&mut self, name: &'static str, default: f32) -> Result<Rgb, SceneError> {
-        self.colour(name, default, f64::from(f32::MAX), DVec3::ONE)
-    }
-
-    /// A number, or else a word.
-    pub(super) fn number_or_word(&mut self, name: &'static str) -> Result<Option<Result<f64, &'a str>>, SceneError> {
-        let Some(element) = self.property(name, &["float", "string"])? else { return Ok(None) };
-        match element.tag.as_str() {
-            "float" => number(element).map(|number| Some(Ok(number))),
-            _ => element.require("value").map(|word| Some(Err(word))),
-        }
-    }
-
     /// What an emitter emits. `<float>` makes a grey. A `<spectrum>` is as bright at each wavelength, which is not white:
     /// white is daylight, which is weaker in red.
     pub(super) fn emission(&mut self, name: &'static str) -> Result<Rgb, SceneError> {

@@ -9,7 +9,6 @@ use vdf_geometry::Triangle;
 use placement::Placement;
 
 use super::document::Element;
-use super::materials;
 use super::objects;
 use super::properties::Object;
 use super::{Loader, features, names};
@@ -60,8 +59,8 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let (interior, exterior) = media(loader, &mut object)?;
     let radiance = area_emitter(loader, &mut object)?;
     let bsdf = match object.at_most_one("bsdf")? {
-        Some(nested) => materials::bsdf(loader, nested.object)?,
-        None => Some(materials::default_bsdf(radiance.is_some())),
+        Some(nested) => objects::bsdf(loader, nested.object)?,
+        None => Some(objects::default_bsdf(radiance.is_some())),
     };
     // As Mitsuba 3.9.1 was seen to do: the winding of the moved vertices decides on which side a medium is, and how a
     // mesh shades; but cube and rectangle shade with their own normals, which a mirroring does not turn round.
@@ -87,12 +86,6 @@ fn attach<'a>(
     let at = &element.at;
     let has_medium = interior.is_some() || exterior.is_some();
     match bsdf {
-        // Light passes into the medium and out of it, bent; shadow segments end here.
-        Some(Bsdf::Dielectric(_)) if has_medium && radiance.is_none() => {
-            loader.boundaries.push(Boundary { triangles: triangles.clone(), interior, exterior });
-            loader.boundary_elements.push(element);
-            attach(loader, element, triangles, bsdf, None, [None, None])
-        }
         Some(_) if has_medium => Err(at.error(
             "a shape with an interior or exterior medium but without a null BSDF is opaque",
             "add <bsdf type=\"null\"/> to let light through; without a BSDF Mitsuba 3 makes it diffuse 0.5",
@@ -108,7 +101,7 @@ fn attach<'a>(
                 at,
                 "an area emitter with a null BSDF: Mitsuba lets light through it, here it is opaque and black",
             );
-            attach(loader, element, triangles, Some(materials::default_bsdf(true)), radiance, [None, None])
+            attach(loader, element, triangles, Some(objects::default_bsdf(true)), radiance, [None, None])
         }
         None if has_medium => {
             loader.boundaries.push(Boundary { triangles, interior, exterior });
