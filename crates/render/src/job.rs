@@ -144,8 +144,15 @@ impl<R: Recorder> PathTracer<'_, R> {
         let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
         let FilterSample { offset: [dx, dy], weight } = self.filter.sample(&mut sampler);
         let world = self.tracer.world;
-        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
-        let ray = self.tracer.camera_ray(self.camera.position(), segment, direction);
+        let (x, y, reach) = (f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
+        let centre = self.camera.position();
+        let (position, segment, direction) = if self.camera.has_lens() {
+            self.camera.ray_through(x, y, reach, sampler.next_2d())
+        } else {
+            let (segment, direction) = self.camera.ray(x, y, reach);
+            (centre, segment, direction)
+        };
+        let ray = self.tracer.camera_ray(centre, position, segment, direction);
         (self.tracer.radiance(self.integrator, ray, &mut sampler, counters), weight)
     }
 }
