@@ -95,7 +95,7 @@ fn main() -> anyhow::Result<()> {
     let once = IntegratorSettings { max_depth: Some(2), ..scene.integrator };
     let mut black = Scene { integrator: once, ..scene.clone() };
     for surface in &mut black.surfaces {
-        surface.bsdf = Bsdf { front: Rgb::ZERO, back: Rgb::ZERO };
+        surface.bsdf = Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO);
     }
     let raymarch = |n| Integrator::raymarch(n);
     let direct = Scene { integrator: once, ..scene.clone() };

@@ -212,7 +212,8 @@ fn drawn_angles() {
 fn crossings_at_any_angle() {
     let mut bound = Bound::new("crossing");
     let triangles = cuboid(vec3(-8.0, -6.0, -4.0), vec3(8.0, 10.0, 12.0));
-    let boundary = Boundary { triangles: triangles.clone(), interior: Some(FOG), exterior: None };
+    let boundary =
+        Boundary { triangles: triangles.clone(), interior: Some(FOG), exterior: None, ..Boundary::default() };
     let sigma_t = 0.125;
     let media = fog(sigma_t, &[boundary]);
     let bvh = Bvh::new(&triangles);
@@ -244,7 +245,7 @@ fn crossings_on_a_shared_edge() {
     let mut bound = Bound::new("crossing on an edge");
     let triangles = cuboid(vec3(-8.0, -8.0, -8.0), vec3(8.0, 8.0, 8.0));
     let sigma_t = 0.125;
-    let media = fog(sigma_t, &[Boundary { triangles, interior: Some(FOG), exterior: None }]);
+    let media = fog(sigma_t, &[Boundary { triangles, interior: Some(FOG), exterior: None, ..Boundary::default() }]);
     for i in 0..400 {
         let mut u = Sampler::new(66, i, 0, 0);
         let reach = [32.0, 1e4, 1e8][i as usize % 3];

@@ -78,12 +78,12 @@ fn floor(fog_from: f32, place: Place, emitter: &str) -> Scene {
         place.triangles(t)
     };
     let grey = Rgb::splat(0.8);
-    let bsdf = Bsdf { front: grey, back: grey };
-    scene.surfaces.push(Surface { triangles: square(5.0, 0.0, true), bsdf, radiance: None });
+    let bsdf = Bsdf::lambertian(grey, grey);
+    scene.surfaces.push(Surface { triangles: square(5.0, 0.0, true), bsdf, radiance: None, ..Surface::default() });
     let fog = add_medium(&mut scene, SIGMA_T, 0.0, Phase::Isotropic);
     scene.sensor.medium = Some(fog);
     let triangles = place.triangles(cuboid(vec3(-4.0, fog_from, -4.0), vec3(4.0, 3.0, 4.0)));
-    scene.boundaries.push(Boundary { triangles, interior: Some(fog), exterior: None });
+    scene.boundaries.push(Boundary { triangles, interior: Some(fog), exterior: None, ..Boundary::default() });
     match emitter {
         "point" => {
             scene.emitters.push(Emitter::Point { position: place.point(LIGHT), intensity: Rgb::splat(10.0) });
@@ -92,8 +92,9 @@ fn floor(fog_from: f32, place: Place, emitter: &str) -> Scene {
             // A small lamp, 0.02 wide, in the plane of the fog's upper face.
             let lamp = Surface {
                 triangles: square(0.01, 3.0, false),
-                bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
+                bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
                 radiance: Some(Rgb::splat(1e4)),
+                ..Surface::default()
             };
             scene.emitters.push(Emitter::Area { surface: scene.surfaces.len() });
             scene.surfaces.push(lamp);
@@ -181,8 +182,9 @@ fn a_flush_room_is_a_white_furnace() {
             let half = Rgb::splat(0.5);
             scene.surfaces.push(Surface {
                 triangles: walls,
-                bsdf: Bsdf { front: half, back: Rgb::ZERO },
+                bsdf: Bsdf::lambertian(half, Rgb::ZERO),
                 radiance: Some(half),
+                ..Surface::default()
             });
             scene.emitters.push(Emitter::Area { surface: 0 });
             let medium = add_medium(&mut scene, 1.5, 1.0, Phase::Isotropic);
@@ -191,6 +193,7 @@ fn a_flush_room_is_a_white_furnace() {
                 triangles: place.triangles(cuboid(Vec3::splat(-fog), Vec3::splat(fog))),
                 interior: Some(medium),
                 exterior: None,
+                ..Boundary::default()
             });
             let (mean, error) = mean_and_error(&rendered(&scene, &options()).image.pixels);
             assert!((mean - 1.0).abs() <= 5.0 * error, "{name}, {place:?}: {mean} ± {error}");
@@ -209,11 +212,16 @@ fn a_sheet_has_two_sides() {
     for (fog_is_before, depth) in [(false, 0.0_f64), (true, 0.5 * (1.0 + 1.5))] {
         let mut scene = empty_scene(4, 16, 1e-6);
         let one = Rgb::ONE;
-        scene.surfaces.push(Surface { triangles: sheet.clone(), bsdf: Bsdf { front: one, back: one }, radiance: None });
+        scene.surfaces.push(Surface {
+            triangles: sheet.clone(),
+            bsdf: Bsdf::lambertian(one, one),
+            radiance: None,
+            ..Surface::default()
+        });
         let medium = add_medium(&mut scene, 0.5, 0.0, Phase::Isotropic);
         let (z0, z1) = if fog_is_before { (0.5, 2.0) } else { (2.0, 4.0) };
         let triangles = cuboid(vec3(-5.0, -5.0, z0), vec3(5.0, 5.0, z1));
-        scene.boundaries.push(Boundary { triangles, interior: Some(medium), exterior: None });
+        scene.boundaries.push(Boundary { triangles, interior: Some(medium), exterior: None, ..Boundary::default() });
         scene.emitters.push(Emitter::Point { position: dvec3(0.0, 0.0, 1.0), intensity: Rgb::splat(PI as f32) });
         let expected = (-depth).exp();
         for integrator in BOTH {
@@ -233,7 +241,12 @@ fn stacks_of_touching_boxes_are_one_fog() {
             let boundary = |i: u16| {
                 let z = f32::from(i) * height;
                 let triangles = cuboid(vec3(-3.0, -3.0, z), vec3(3.0, 3.0, z + height));
-                Boundary { triangles: place.triangles(triangles), interior: Some(MediumId(0)), exterior: None }
+                Boundary {
+                    triangles: place.triangles(triangles),
+                    interior: Some(MediumId(0)),
+                    exterior: None,
+                    ..Boundary::default()
+                }
             };
             let medium = Medium { sigma_t: 1.0, albedo: Rgb::ONE, phase: Phase::Isotropic };
             let media = Media::new(&[medium], &(0..boxes).map(boundary).collect::<Vec<_>>(), None);
@@ -285,8 +298,13 @@ fn two_skies_are_their_sum() {
 fn no_light_leaks_into_a_closed_room() {
     let mut scene = empty_scene(8, 16, 0.7);
     scene.sensor.world_from_camera = DMat4::from_translation(dvec3(2.0, 2.0, 2.0));
-    let bsdf = Bsdf { front: Rgb::ONE, back: Rgb::ONE };
-    scene.surfaces.push(Surface { triangles: cuboid(Vec3::ZERO, Vec3::splat(5.0)), bsdf, radiance: None });
+    let bsdf = Bsdf::lambertian(Rgb::ONE, Rgb::ONE);
+    scene.surfaces.push(Surface {
+        triangles: cuboid(Vec3::ZERO, Vec3::splat(5.0)),
+        bsdf,
+        radiance: None,
+        ..Surface::default()
+    });
     scene.emitters.push(Emitter::Point { position: dvec3(0.0, 1.5e11, 0.0), intensity: Rgb::splat(1e23) });
     for method in [Method::NONE, Method::default()] {
         let image = rendered(&scene, &Options { method, ..options() }).image;
@@ -349,8 +367,13 @@ impl Progress for StopAfter {
 #[test]
 fn endless_paths_can_be_stopped() {
     let mut scene = empty_scene(1, 1, 0.7);
-    let bsdf = Bsdf { front: Rgb::ONE, back: Rgb::ONE };
-    scene.surfaces.push(Surface { triangles: cuboid(Vec3::NEG_ONE, Vec3::ONE), bsdf, radiance: None });
+    let bsdf = Bsdf::lambertian(Rgb::ONE, Rgb::ONE);
+    scene.surfaces.push(Surface {
+        triangles: cuboid(Vec3::NEG_ONE, Vec3::ONE),
+        bsdf,
+        radiance: None,
+        ..Surface::default()
+    });
     scene.emitters.push(Emitter::Point { position: dvec3(0.5, 0.5, 0.5), intensity: Rgb::ONE });
     let fog = add_medium(&mut scene, 1.0, 1.0, Phase::Isotropic);
     common::add_fog(&mut scene, Vec3::NEG_ONE, Vec3::ONE, fog);

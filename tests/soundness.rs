@@ -30,8 +30,8 @@ fn sound(name: &str, scene: &Scene, voxel_sizes: &[f64], finer: &[f64]) -> Verif
 /// A scene of these triangles and point lights.
 fn scene(triangles: Vec<Triangle>, lights: &[DVec3]) -> Scene {
     let mut scene = empty_scene(1, 1, 1.0);
-    let bsdf = Bsdf { front: Rgb::ONE, back: Rgb::ONE };
-    scene.surfaces.push(Surface { triangles, bsdf, radiance: None });
+    let bsdf = Bsdf::lambertian(Rgb::ONE, Rgb::ONE);
+    scene.surfaces.push(Surface { triangles, bsdf, radiance: None, ..Surface::default() });
     scene.emitters = lights.iter().map(|&position| Emitter::Point { position, intensity: Rgb::ONE }).collect();
     scene
 }

@@ -98,6 +98,7 @@ pub fn empty_scene(size: u32, spp: u32, tan_half_fov: f64) -> Scene {
             tan_half_fov_x: tan_half_fov,
             near_clip: 1e-9,
             far_clip: 1e6,
+            lens: None,
             medium: None,
         },
         film: FilmSettings {
@@ -140,7 +141,12 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Vec<Triangle> {
 
 /// Fills the box from `min` to `max` with a medium, vacuum outside.
 pub fn add_fog(scene: &mut Scene, min: Vec3, max: Vec3, medium: MediumId) {
-    scene.boundaries.push(Boundary { triangles: cuboid(min, max), interior: Some(medium), exterior: None });
+    scene.boundaries.push(Boundary {
+        triangles: cuboid(min, max),
+        interior: Some(medium),
+        exterior: None,
+        ..Boundary::default()
+    });
 }
 
 /// Mean and standard error of the first channel over all pixels, which must share one expectation.

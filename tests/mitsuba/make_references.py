@@ -91,6 +91,8 @@ PLAN = [
     Case("rock", 2, 128, 256),
     Case("rock", 8, 128, 256),
     Case("cropped", 3, 128, 256, border=4, pixels_are_independent=False),
+    Case("curved", 8, 64, 128),
+    Case("textures", 8, 64, 128),
 ]
 
 

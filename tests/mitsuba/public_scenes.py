@@ -48,8 +48,10 @@ def scenes_below(folder):
     return found, len(texts) - len(found)
 
 
-def render(vdf, scene, out, seed=None, spp=1):
+def render(vdf, scene, out, seed=None, spp=1, crop=None):
     command = [vdf, "render", scene, "--spp", str(spp), "-o", out]
+    if crop is not None:
+        command += ["--crop", crop]
     if seed is not None:
         command += ["--seed", str(seed)]
     return subprocess.run(command, capture_output=True, text=True, timeout=3600)
@@ -111,8 +113,11 @@ def compare(args, scene):
     if not kept.any():
         return ["no block is known to 1 %", "", "", "", "", ""], False
     with np.errstate(divide="ignore", invalid="ignore"):
-        z = z_of(ours, theirs)[kept]
-    z[np.isnan(z)] = 0  # equal and without noise
+        z = z_of(ours, theirs)
+    # Blocks that see only the background have no noise; single precision may round them apart.
+    exact = (ours.var(0) <= 1e-12 * ours.mean(0) ** 2) & (abs(ours.mean(0) - theirs.mean(0)) <= 1e-5 * theirs.mean(0))
+    z[np.isnan(z) | exact] = 0
+    z = z[kept]
     whole = z_of(ours.mean((1, 2, 3)), theirs.mean((1, 2, 3)))
     ratio = ours.mean() / theirs.mean()
     limit = 1 + 6 * math.sqrt(6 / z.size)
@@ -143,7 +148,7 @@ def main():
         parts += without_sensor
         for scene in scenes:
             with tempfile.TemporaryDirectory() as out:
-                done = render(args.vdf, scene, os.path.join(out, "a.exr"))
+                done = render(args.vdf, scene, os.path.join(out, "a.exr"), crop="0,0,1,1")
             if done.returncode != 0 and "has no sensor" in done.stderr:
                 parts += 1
                 continue

@@ -32,8 +32,9 @@ fn scene(reflectance: f32, albedo: f32, density: f64) -> Scene {
     add_fogs(&mut scene, &fogs);
     let surface = |triangles, radiance| Surface {
         triangles,
-        bsdf: Bsdf { front: Rgb::splat(reflectance), back: Rgb::splat(reflectance) },
+        bsdf: Bsdf::lambertian(Rgb::splat(reflectance), Rgb::splat(reflectance)),
         radiance,
+        ..Surface::default()
     };
     scene.surfaces.push(surface(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
     scene.surfaces.push(surface(cuboid(vec3(0.3, -0.5, 2.6), vec3(0.9, 0.6, 4.0)), None));

@@ -24,8 +24,9 @@ fn analog_is_all_or_nothing() {
     let mut scene = empty_scene(256, 1, 1e-9);
     scene.surfaces.push(Surface {
         triangles: vec![Triangle::new(vec3(-9.0, -9.0, 2.0), vec3(9.0, -9.0, 2.0), vec3(0.0, 9.0, 2.0))],
-        bsdf: Bsdf { front: Rgb::splat(0.5), back: Rgb::splat(0.5) },
+        bsdf: Bsdf::lambertian(Rgb::splat(0.5), Rgb::splat(0.5)),
         radiance: None,
+        ..Surface::default()
     });
     scene.emitters.push(Emitter::Point { position: light, intensity: Rgb::splat(2.0) });
     scene.integrator = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
@@ -57,8 +58,9 @@ fn body_in_fog() -> Scene {
     add_fog(&mut scene, vec3(-1.5, -1.5, 0.5), vec3(1.5, 1.5, 4.0), fog);
     let surface = |triangles, radiance| Surface {
         triangles,
-        bsdf: Bsdf { front: Rgb::splat(0.7), back: Rgb::splat(0.7) },
+        bsdf: Bsdf::lambertian(Rgb::splat(0.7), Rgb::splat(0.7)),
         radiance,
+        ..Surface::default()
     };
     scene.surfaces.push(surface(cuboid(vec3(-0.4, -1.4, 2.0), vec3(0.5, 0.2, 2.6)), None));
     scene.surfaces.push(surface(

@@ -25,8 +25,9 @@ fn nothing_is_lost_under_a_uniform_sky() {
             add_fog(&mut scene, vec3(-2.0, -2.0, 1.0), vec3(2.0, 2.0, 4.0), fog);
             scene.surfaces.push(Surface {
                 triangles: cuboid(vec3(-0.5, -0.5, 2.0), vec3(0.7, 0.4, 3.0)),
-                bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
+                bsdf: Bsdf::lambertian(Rgb::ONE, Rgb::ONE),
                 radiance: None,
+                ..Surface::default()
             });
             check.mean(&format!("{phase:?}"), &check.render(&scene, 32), 1.0);
             // From inside the fog.
@@ -47,8 +48,9 @@ fn room(emitted: f32, reflectance: f32, one_wall_only: bool) -> Scene {
         inwards.partition(|t| !one_wall_only || t.vertices.iter().all(|v| v.z == 1.5));
     let surface = |triangles, reflectance, radiance| Surface {
         triangles,
-        bsdf: Bsdf { front: Rgb::splat(reflectance), back: Rgb::ZERO },
+        bsdf: Bsdf::lambertian(Rgb::splat(reflectance), Rgb::ZERO),
         radiance,
+        ..Surface::default()
     };
     scene.surfaces.push(surface(emitting, reflectance, Some(Rgb::splat(emitted))));
     scene.surfaces.push(surface(white, 1.0, None));
@@ -104,8 +106,9 @@ fn a_cavity_is_uniform() {
             // The camera looks away from the black wall, then at it; a white body is in its way.
             let body = Surface {
                 triangles: cuboid(vec3(-0.5, -0.6, -0.8), vec3(0.1, 0.2, -0.4)),
-                bsdf: Bsdf { front: Rgb::ONE, back: Rgb::ONE },
+                bsdf: Bsdf::lambertian(Rgb::ONE, Rgb::ONE),
                 radiance: None,
+                ..Surface::default()
             };
             scene.surfaces.push(body);
             for (view, angle) in [("away", std::f64::consts::PI), ("towards", 0.0)] {

@@ -22,8 +22,9 @@ fn wall(reflectance: f32) -> Scene {
     let mut scene = empty_scene(32, 1, 1e-12);
     scene.surfaces.push(Surface {
         triangles: vec![Triangle::new(vec3(-50.0, -50.0, 2.0), vec3(50.0, -50.0, 2.0), vec3(0.0, 50.0, 2.0))],
-        bsdf: Bsdf { front: Rgb::splat(reflectance), back: Rgb::splat(reflectance) },
+        bsdf: Bsdf::lambertian(Rgb::splat(reflectance), Rgb::splat(reflectance)),
         radiance: None,
+        ..Surface::default()
     });
     scene.integrator = IntegratorSettings { max_depth: Some(2), rr_depth: 10 };
     scene
@@ -144,8 +145,9 @@ fn by_an_area_light() {
                     Triangle::new(corners[0], corners[1], corners[2]),
                     Triangle::new(corners[0], corners[2], corners[3]),
                 ],
-                bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
+                bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
                 radiance: Some(Rgb::ONE),
+                ..Surface::default()
             });
             scene.emitters.push(Emitter::Area { surface: 1 });
             let through = (-optical_depth(fogs, DVec3::ZERO, SEEN)).exp();

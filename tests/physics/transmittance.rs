@@ -73,9 +73,9 @@ fn of_nested_media_changes_at_their_boundaries() {
     let inner = add_medium(&mut scene, 1.0, 0.0, Phase::Isotropic);
     scene.sensor.medium = Some(outer);
     let triangles = cuboid(Vec3::splat(-5.0), Vec3::splat(5.0));
-    scene.boundaries.push(Boundary { triangles, interior: Some(outer), exterior: None });
+    scene.boundaries.push(Boundary { triangles, interior: Some(outer), exterior: None, ..Boundary::default() });
     let triangles = cuboid(vec3(-1.0, -1.0, 1.0), vec3(1.0, 1.0, 2.0));
-    scene.boundaries.push(Boundary { triangles, interior: Some(inner), exterior: Some(outer) });
+    scene.boundaries.push(Boundary { triangles, interior: Some(inner), exterior: Some(outer), ..Boundary::default() });
     scene.emitters.push(Emitter::Constant { radiance: Rgb::ONE });
     let expected = (-(0.2 * 4.0 + 1.0_f64)).exp();
     let mut marched = Check::new("transmittance, nested", RAYMARCH);
@@ -96,7 +96,12 @@ fn of_segments_is_that_of_clipping_to_slabs() {
             fogs.iter().map(|f| vdf::scene::Medium { sigma_t: f.sigma_t, albedo: Rgb::ZERO, phase: f.phase }).collect();
         let boundaries: Vec<_> = (0..)
             .zip(&fogs)
-            .map(|(k, f)| Boundary { triangles: cuboid(f.min, f.max), interior: Some(MediumId(k)), exterior: None })
+            .map(|(k, f)| Boundary {
+                triangles: cuboid(f.min, f.max),
+                interior: Some(MediumId(k)),
+                exterior: None,
+                ..Boundary::default()
+            })
             .collect();
         let media = Media::new(&media, &boundaries, None);
         for _ in 0..8 {

@@ -9,13 +9,13 @@ use vdf::{
 
 use crate::{
     common::{Options, add_fog, add_medium, cuboid, empty_scene, integrate, mean_and_error, options, rendered},
-    room::{BOTH, GREY, bits, room, same_for_all_methods, wall},
+    room::{BACK, BOTH, GREY, bits, room, same_for_all_methods, wall},
 };
 
 /// The airlight integral along +Z with any transmittance towards the light.
 fn airlight(scene: &Scene, z: (f64, f64)) -> f64 {
     let media = Media::of_scene(scene);
-    let Emitter::Point { position, intensity } = scene.emitters[0] else { panic!("a point light") };
+    let Emitter::Point { position, intensity } = scene.emitters[0].clone() else { panic!("a point light") };
     let Medium { sigma_t, albedo, phase } = scene.media[0];
     let outside = Segment::new(dvec3(0.0, 0.0, -99.0), DVec3::ZERO);
     assert_eq!(media.transmittance(&outside, &media.regions_at(outside.p)), 1.0, "the camera is in vacuum");
@@ -143,6 +143,7 @@ fn case_38_boundaries_that_change_nothing() {
         triangles: cuboid(vec3(x0, -1.0, -1.0), vec3(x1, 1.0, 1.0)),
         interior: Some(MediumId(m)),
         exterior: None,
+        ..Boundary::default()
     };
     let whole = Media::new(&[medium(0.7)], &[slab(0.0, 8.0, 0)], None);
     let pieces: Vec<_> = (0..8_u8).map(|i| slab(f32::from(i), f32::from(i) + 1.0, u32::from(i % 2))).collect();
@@ -196,7 +197,7 @@ fn case_40_channels_that_are_zero() {
     let make = |[albedo, reflectance, intensity]: [Rgb; 3]| {
         let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
         scene.media[0].albedo = albedo;
-        scene.surfaces.iter_mut().for_each(|s| s.bsdf = Bsdf { front: reflectance, back: reflectance });
+        scene.surfaces.iter_mut().for_each(|s| s.bsdf = Bsdf::lambertian(reflectance, reflectance));
         scene.emitters = vec![Emitter::Point { position: dvec3(2.0, 6.0, 3.0), intensity }];
         scene.integrator = IntegratorSettings { max_depth: Some(6), rr_depth: 100 };
         scene
@@ -251,8 +252,12 @@ fn case_42_a_light_on_the_camera_ray() {
 #[test]
 fn case_43_intervals_without_length() {
     let medium = |sigma_t| Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
-    let closed =
-        |min: Vec3, max: Vec3| Boundary { triangles: cuboid(min, max), interior: Some(MediumId(0)), exterior: None };
+    let closed = |min: Vec3, max: Vec3| Boundary {
+        triangles: cuboid(min, max),
+        interior: Some(MediumId(0)),
+        exterior: None,
+        ..Boundary::default()
+    };
     let large = Vec3::splat(1e4);
     let s = Segment::new(dvec3(0.3, 0.2, -50.0), dvec3(1.0, 2.0, 70.0));
     for thickness in [0.0, 1e-30, 1e-12, 1e-9, 1e-8] {
@@ -317,8 +322,9 @@ fn case_44_tiny_and_huge_emitters() {
             [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]: [f32; 2]| vec3(x * half, y * half, z));
         scene.surfaces.push(Surface {
             triangles: vec![Triangle::new(a, b, c), Triangle::new(a, c, d)],
-            bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ZERO },
+            bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
             radiance: Some(Rgb::splat(0.5 / (half * half).min(1.0))),
+            ..Surface::default()
         });
         scene.emitters.push(Emitter::Area { surface: 1 });
         scene.integrator.max_depth = Some(2);
@@ -327,7 +333,7 @@ fn case_44_tiny_and_huge_emitters() {
         let root = (1.0 + x * x).sqrt();
         let form = 2.0 / std::f64::consts::PI * x / root * (x / root).atan() * 2.0;
         let radiance = f64::from(0.5 / (half * half).min(1.0));
-        let expected = f64::from(GREY.back.x) * radiance * form;
+        let expected = f64::from(BACK) * radiance * form;
         let (mean, error) = mean_and_error(&rendered(&scene, &options()).image.pixels);
         assert!(
             (mean - expected).abs() <= 5.0 * error + 2e-6 * expected,

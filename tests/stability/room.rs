@@ -12,14 +12,17 @@ use crate::common::{Options, add_fog, add_medium, cuboid, empty_scene, options, 
 
 pub(crate) const BOTH: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 4 }];
 
-pub(crate) const GREY: Bsdf = Bsdf { front: Rgb::splat(0.6), back: Rgb::splat(0.4) };
+pub(crate) const GREY: Bsdf = Bsdf::lambertian(Rgb::splat(FRONT), Rgb::splat(BACK));
+/// The reflectances of its sides.
+pub(crate) const FRONT: f32 = 0.6;
+pub(crate) const BACK: f32 = 0.4;
 
 pub(crate) fn bits(pixels: &[Rgb]) -> Vec<[u32; 3]> {
     pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 
 pub(crate) fn surface(triangles: Vec<Triangle>) -> Surface {
-    Surface { triangles, bsdf: GREY, radiance: None }
+    Surface { triangles, bsdf: GREY, radiance: None, ..Surface::default() }
 }
 
 /// A closed room from 0 to 8, open only in being seen from inside, with a block on whose corner voxels of size 1 meet, and

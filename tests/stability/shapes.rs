@@ -67,15 +67,16 @@ fn degenerate_and_duplicated_triangles() {
     let doubles: Vec<_> = scene.surfaces[0].triangles.clone();
     scene.surfaces.push(Surface {
         triangles: doubles,
-        bsdf: Bsdf { front: Rgb::ZERO, back: Rgb::ONE },
+        bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ONE),
         radiance: None,
+        ..Surface::default()
     });
     for (a, b) in same_for_all_methods("with doubles", &scene, 1.0).iter().zip(&reference) {
         assert!(bits(a) == bits(b), "doubles change the image");
     }
     // An emitter of which nothing is left.
     let mut dark = room(&[]);
-    dark.surfaces.push(Surface { triangles: degenerate, bsdf: GREY, radiance: Some(Rgb::ONE) });
+    dark.surfaces.push(Surface { triangles: degenerate, bsdf: GREY, radiance: Some(Rgb::ONE), ..Surface::default() });
     dark.emitters.push(Emitter::Area { surface: 2 });
     for pixels in same_for_all_methods("an emitter without area", &dark, 1.0) {
         assert!(pixels.iter().all(|&p| p == Rgb::ZERO));
@@ -98,7 +99,8 @@ fn slivers() {
     let cuts: Vec<f32> = [vec![1.0], thin, vec![2.5, 2.5_f32.next_up(), 4.0, 7.0]].concat();
     let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
     scene.sample_count = 32;
-    let mut emitting = Surface { triangles: strip(&[1.0, 7.0]), bsdf: GREY, radiance: Some(Rgb::splat(0.3)) };
+    let mut emitting =
+        Surface { triangles: strip(&[1.0, 7.0]), bsdf: GREY, radiance: Some(Rgb::splat(0.3)), ..Surface::default() };
     scene.surfaces.push(emitting.clone());
     scene.emitters.push(Emitter::Area { surface: 2 });
     let whole = same_for_all_methods("one floor", &scene, 1.0);

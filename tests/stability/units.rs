@@ -9,7 +9,7 @@ use vdf::{
 
 use crate::{
     common::{self, Options, builtin, empty_scene, mean_and_error, options, rendered},
-    room::{BOTH, GREY, bits, room, same_for_all_methods, wall},
+    room::{BOTH, FRONT, GREY, bits, room, same_for_all_methods, wall},
 };
 
 /// The scene in other units and elsewhere: x becomes scale·x + shift. The picture is the same.
@@ -166,7 +166,7 @@ fn a_light_close_to_a_wall() {
     let lift = 8.0 / 4_294_967_296.0;
     for height in [1e-6, 1e-3, 0.5_f64] {
         for x in [0.0, height, 1.0, 7.0] {
-            let exact = f64::from(GREY.front.x) / std::f64::consts::PI * height / height.hypot(x).powi(3);
+            let exact = f64::from(FRONT) / std::f64::consts::PI * height / height.hypot(x).powi(3);
             let found = lit_from_height(height, x);
             // At x = 0 the distance is too small as well: 1/h² changes by twice as much. Film positions spread over 10⁻⁹.
             let allowed = 2.1 * lift / height + 1e-6 + 8e-9 / height;

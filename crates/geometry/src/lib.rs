@@ -1,6 +1,6 @@
-//! Triangles, segments, and whether they meet: exactly.
+//! Triangles, curved shapes, segments, and whether they meet: exactly.
 //!
-//! [`SegmentTest`] answers for one triangle, [`Bvh`] for all of a scene. Both answer for the very single-precision
+//! [`SegmentTest`] answers for one triangle, [`Bvh`] for all of a scene; [`CurvedShape`] and [`CurvedSet`] for spheres, disks and cylinders. Both answer for the very single-precision
 //! vertices and double-precision end points that they were given, so an answer never depends on rounding or on the
 //! shape of a tree.
 //!
@@ -19,6 +19,7 @@
 struct Readme;
 
 mod bounds;
+mod curved;
 mod hierarchy;
 mod intersect;
 mod segment;
@@ -28,6 +29,7 @@ mod triangle;
 mod tests;
 
 pub use bounds::Bounds;
+pub use curved::{CurvedHit, CurvedKind, CurvedSet, CurvedShape};
 pub use hierarchy::{Bvh, Hit};
 pub use intersect::{SegmentTest, TriangleHit, intersect_exact};
 pub use segment::Segment;

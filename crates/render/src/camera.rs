@@ -1,4 +1,4 @@
-//! The pinhole camera.
+//! The camera: a pinhole or a thin lens.
 
 use glam::{DVec3, dvec3};
 use vdf_geometry::Segment;
@@ -39,7 +39,36 @@ impl Camera {
         (Segment::new(p, q), direction)
     }
 
-    /// Where all rays come from.
+    /// Whether it has a lens, on which [`Camera::ray_through`] wants a point.
+    #[inline]
+    #[must_use]
+    pub fn has_lens(&self) -> bool {
+        self.sensor.lens.is_some()
+    }
+
+    /// As [`Camera::ray`], through a point of the lens drawn by two uniform numbers; and that point. Same geometry as Mitsuba 3 `thinlens`: the rays of one
+    /// film position meet in the plane of focus.
+    #[must_use]
+    pub fn ray_through(&self, x: f64, y: f64, reach: f64, [u0, u1]: [f64; 2]) -> (DVec3, Segment, DVec3) {
+        let s = &self.sensor;
+        let Some(lens) = &s.lens else {
+            let (segment, direction) = self.ray(x, y, reach);
+            return (self.position(), segment, direction);
+        };
+        let [width, height] = self.size;
+        let t = s.tan_half_fov_x;
+        let through = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
+        let (radius, (sin, cos)) = (lens.radius * u0.sqrt(), (std::f64::consts::TAU * u1).sin_cos());
+        let on_lens = dvec3(radius * cos, radius * sin, 0.0);
+        let local = (through * lens.focus_distance - on_lens) / lens.focus_distance;
+        let at = |depth: f64| s.world_from_camera.transform_point3(on_lens + local * depth);
+        let p = at(s.near_clip);
+        let direction = s.world_from_camera.transform_vector3(local).normalize();
+        let q = if s.far_clip < reach { at(s.far_clip) } else { p + direction * reach };
+        (at(0.0), Segment::new(p, q), direction)
+    }
+
+    /// Where all rays come from; with a lens its middle.
     #[inline]
     #[must_use]
     pub fn position(&self) -> DVec3 {

@@ -8,7 +8,7 @@ use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 use crate::{
     Camera, FilterSample, Integrator, PixelFilter, PreparedScene, Progress, RenderOptions, Sampler, SamplerKind,
     film::{Feature, tile_rects},
-    integrator::Tracer,
+    integrator::{PathRay, Tracer},
 };
 
 /// What to render, with all options resolved.
@@ -135,12 +135,24 @@ impl<R: Recorder> PathTracer<'_, R> {
     pub(crate) fn feature(&self, x: u32, y: u32, sample: u32) -> Option<Feature> {
         let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
         let FilterSample { offset: [dx, dy], .. } = self.filter.sample(&mut sampler);
-        let world = self.tracer.world;
-        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
-        let ray = self.tracer.camera_ray(self.camera.position(), segment, direction);
-        let surface = world.surface_point(&world.bvh.intersect(&ray.segment)?, direction);
+        let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, &mut sampler);
+        let hit = self.tracer.world.bvh.intersect(&ray.segment);
+        let surface = self.tracer.surface_met(hit, &ray.segment, ray.direction)?;
         let depth = surface.point.distance(self.camera.position());
         Some(Feature { albedo: surface.reflectance, normal: surface.normal, position: surface.point, depth })
+    }
+
+    /// The ray through a place of the film, from the camera's centre or from a point of its lens.
+    #[inline]
+    fn camera_ray(&self, x: f64, y: f64, sampler: &mut Sampler) -> PathRay {
+        let (centre, reach) = (self.camera.position(), self.tracer.world.lights.reach());
+        let (position, segment, direction) = if self.camera.has_lens() {
+            self.camera.ray_through(x, y, reach, sampler.next_2d())
+        } else {
+            let (segment, direction) = self.camera.ray(x, y, reach);
+            (centre, segment, direction)
+        };
+        self.tracer.camera_ray(centre, position, segment, direction)
     }
 
     /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.
@@ -148,9 +160,7 @@ impl<R: Recorder> PathTracer<'_, R> {
     pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> (Rgb, f64) {
         let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
         let FilterSample { offset: [dx, dy], weight } = self.filter.sample(&mut sampler);
-        let world = self.tracer.world;
-        let (segment, direction) = self.camera.ray(f64::from(x) + dx, f64::from(y) + dy, world.lights.reach());
-        let ray = self.tracer.camera_ray(self.camera.position(), segment, direction);
+        let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, &mut sampler);
         (self.tracer.radiance(self.integrator, ray, &mut sampler, counters), weight)
     }
 }

@@ -41,6 +41,7 @@ mod job;
 mod lights;
 mod media;
 mod options;
+mod others;
 mod phase;
 mod prepared;
 mod render;

@@ -1,39 +1,66 @@
 //! A scene prepared for rendering: hierarchy, media, emitters and the surface behind every triangle.
 
-use glam::DVec3;
-use vdf_geometry::{Bounds, Bvh, Hit, Triangle};
-use vdf_scene::{Bsdf, Emitter, Rgb, Scene};
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, Vec2, dvec3};
+use vdf_geometry::{Bounds, Bvh, CurvedKind, CurvedShape, Hit, Segment, Triangle};
+use vdf_scene::{Bsdf, Emitter, MeshAttributes, Rgb, Scene};
 use vdf_visibility::LightShape;
 
-use crate::{GridExtent, lights::Lights, media::Media};
+use crate::{
+    GridExtent,
+    bsdf::Material,
+    lights::Lights,
+    media::Media,
+    others::{CurvedPoint, Met, OtherShapes, TrianglePlace},
+};
 
 /// What the integrators need of a scene. Immutable and shared by all threads.
 #[derive(Debug)]
 pub struct World {
-    /// Over all occluders.
+    /// Over all opaque triangles.
     pub bvh: Bvh,
     /// The media and their boundaries.
     pub media: Media,
     /// The emitters.
     pub lights: Lights,
-    /// All occluders, surface by surface.
+    /// All opaque triangles, surface by surface: what proofs are about.
     pub triangles: Vec<Triangle>,
     /// Bounds of occluders, medium boundaries, point emitters and the camera.
     pub bounds: Bounds,
-    /// What a voxel grid for proofs has to cover: the occluders, and point emitters near them.
+    /// What a voxel grid for proofs has to cover: the opaque triangles, and point emitters near them.
     pub occluder_bounds: Bounds,
     /// Whether the camera's far plane may hide something.
     pub(crate) far_plane_clips: bool,
+    /// Curved shapes and veils, if there are any.
+    pub(crate) others: Option<Box<OtherShapes>>,
+    /// The materials of the surfaces that are no plain Lambertian ones.
+    pub(crate) materials: Vec<Shading>,
     surface_of_triangle: Vec<u32>,
     surfaces: Vec<SurfaceData>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct SurfaceData {
-    bsdf: Bsdf,
+    /// Reflectance of the two sides, if it is plain.
+    front: Rgb,
+    back: Rgb,
     radiance: Rgb,
     /// Number of the area emitter, if it is one.
     emitter: Option<usize>,
+    /// Number of its [`Shading`], if it is not plain.
+    shading: Option<u32>,
+    /// The number of its first triangle, among the opaque ones or, of a veil, among those of veils.
+    first_triangle: u32,
+    veil: bool,
+    curved: Option<CurvedShape>,
+}
+
+/// How a surface scatters that is no plain Lambertian one.
+#[derive(Debug)]
+pub(crate) struct Shading {
+    pub(crate) material: Material,
+    attributes: std::sync::Arc<MeshAttributes>,
 }
 
 /// A point on an occluder, seen from one side.
@@ -43,34 +70,105 @@ pub struct SurfacePoint {
     pub point: DVec3,
     /// Unit normal on that side.
     pub normal: DVec3,
-    /// Reflectance of that side.
+    /// Reflectance of that side, if it is a plain Lambertian surface.
     pub reflectance: Rgb,
     /// Radiance emitted from that side.
     pub emitted: Rgb,
     /// Number of the area emitter, if it is one.
     pub emitter: Option<usize>,
+    /// Where it is, if it is not plain: [`World::shading`] finds what scattering depends on. That is large, and most points do not have it.
+    pub(crate) place: Option<Place>,
+}
+
+/// A place on a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    surface: u32,
+    /// The number of the triangle in the surface.
+    triangle: u32,
+    /// The barycentric weights of its second and third vertex.
+    barycentric: [f64; 2],
+}
+
+/// What scattering at a point depends on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadingPoint {
+    /// Index into [`World::materials`].
+    pub(crate) material: u32,
+    pub(crate) uv: Vec2,
+    /// The shading frame: unit vectors, the last is the normal, in front of the surface whichever side is seen.
+    frame: [DVec3; 3],
+    /// To where the path comes from, in that frame.
+    pub(crate) wi: DVec3,
+    /// How far the point was lifted off the surface.
+    lift: f64,
+}
+
+impl ShadingPoint {
+    /// A direction of the world in the shading frame.
+    #[inline]
+    pub(crate) fn to_local(&self, d: DVec3) -> DVec3 {
+        dvec3(self.frame[0].dot(d), self.frame[1].dot(d), self.frame[2].dot(d))
+    }
+
+    /// A direction of the shading frame in the world.
+    #[inline]
+    pub(crate) fn to_world(&self, d: DVec3) -> DVec3 {
+        (self.frame[0] * d.x + self.frame[1] * d.y + self.frame[2] * d.z).normalize_or(self.frame[2])
+    }
+}
+
+impl SurfacePoint {
+    /// The point lifted to the side that is not seen.
+    pub(crate) fn behind(&self, shading: &ShadingPoint) -> DVec3 {
+        self.point - self.normal * (2.0 * shading.lift)
+    }
 }
 
 impl World {
     /// Prepares `scene`. Cost: that of [`Bvh::new`].
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let triangles: Vec<_> = scene.surfaces.iter().flat_map(|s| s.triangles.iter().copied()).collect();
-        let surface_of_triangle = (0..).zip(&scene.surfaces).flat_map(|(i, s)| vec![i; s.triangles.len()]).collect();
-        let mut surfaces: Vec<_> = scene
-            .surfaces
-            .iter()
-            .map(|s| SurfaceData { bsdf: s.bsdf, radiance: s.radiance.unwrap_or(Rgb::ZERO), emitter: None })
-            .collect();
+        let mut materials = Vec::new();
+        let mut surfaces: Vec<SurfaceData> = Vec::new();
+        let (mut triangles, mut surface_of_triangle) = (Vec::new(), Vec::new());
+        let (mut is_veil, mut veiled) = (Vec::new(), 0);
+        for (i, s) in (0..).zip(&scene.surfaces) {
+            let plain = match &s.bsdf {
+                Bsdf::Lambertian { front, back } if s.attributes.normals.is_empty() => Some((*front, *back)),
+                _ => None,
+            };
+            let shading = plain.is_none().then(|| {
+                let material = Material::from(&s.bsdf);
+                materials.push(Shading { material, attributes: s.attributes.clone() });
+                (materials.len() - 1) as u32
+            });
+            let veil = shading.is_some_and(|m| materials[m as usize].material.may_pass());
+            let (front, back) = plain.unwrap_or_default();
+            let first_triangle = if veil { veiled } else { triangles.len() as u32 };
+            let (radiance, curved) = (s.radiance.unwrap_or(Rgb::ZERO), s.curved);
+            surfaces.push(SurfaceData { front, back, radiance, emitter: None, shading, first_triangle, veil, curved });
+            is_veil.push(veil);
+            if veil {
+                veiled += s.triangles.len() as u32;
+            } else {
+                triangles.extend(&s.triangles);
+                surface_of_triangle.resize(triangles.len(), i);
+            }
+        }
         for (i, emitter) in scene.emitters.iter().enumerate() {
             if let Emitter::Area { surface } = emitter {
                 surfaces[*surface].emitter = Some(i);
             }
         }
         let bvh = Bvh::new(&triangles);
+        let others = OtherShapes::new(scene, |i| is_veil[i]).map(Box::new);
         let boundaries = Bounds::of_triangles(scene.boundaries.iter().flat_map(|b| &b.triangles));
+        let spheres = scene.boundaries.iter().filter_map(|b| b.curved).map(|c| *c.bounds());
+        let curved = others.as_ref().map_or(Bounds::EMPTY, |o| o.bounds());
+        let shapes = spheres.fold(bvh.bounds().union(boundaries).union(curved), Bounds::union);
         // No ray has to come near an emitter that is a point, so that a sun far away takes nobody's precision.
-        let matter = bvh.bounds().union(boundaries).with(scene.sensor.world_from_camera.w_axis.truncate());
+        let matter = shapes.with(scene.sensor.world_from_camera.w_axis.truncate());
         let bounds = positions(scene).fold(matter, Bounds::with);
         Self {
             media: Media::of_scene(scene),
@@ -80,6 +178,8 @@ impl World {
             bvh,
             triangles,
             bounds,
+            others,
+            materials,
             surface_of_triangle,
             surfaces,
         }
@@ -99,21 +199,162 @@ impl World {
     #[must_use]
     pub fn surface_point(&self, hit: &Hit, direction: DVec3) -> SurfacePoint {
         let triangle = &self.triangles[hit.triangle as usize];
-        let [a, b, c] = triangle.vertices_f64();
-        let [wa, wb, wc] = hit.barycentric;
-        // Exact predicates can hit so thin a triangle that its rounded normal is zero.
-        let normal = triangle.area_normal().normalize_or(-direction);
-        let data = &self.surfaces[self.surface_of_triangle[hit.triangle as usize] as usize];
-        let front = direction.dot(normal) < 0.0;
-        let normal = if front { normal } else { -normal };
-        SurfacePoint {
-            point: a * wa + b * wb + c * wc + normal * lift(triangle),
-            normal,
-            reflectance: if front { data.bsdf.front } else { data.bsdf.back },
-            emitted: if front { data.radiance } else { Rgb::ZERO },
-            emitter: data.emitter,
+        let surface = self.surface_of_triangle[hit.triangle as usize];
+        let data = &self.surfaces[surface as usize];
+        let number = hit.triangle - data.first_triangle;
+        triangle_point(data, triangle, hit, direction, TrianglePlace { surface, number })
+    }
+
+    /// The surface at whatever a segment meets, for a ray of direction `direction`.
+    pub(crate) fn surface_at(&self, met: &Met, segment: &Segment, direction: DVec3) -> SurfacePoint {
+        match met {
+            Met::Triangle(hit) => self.surface_point(hit, direction),
+            Met::Veil(hit, triangle, place) => {
+                triangle_point(&self.surfaces[place.surface as usize], triangle, hit, direction, *place)
+            }
+            Met::Curved(surface, t) => {
+                let data = &self.surfaces[*surface as usize];
+                let Some(shape) = &data.curved else { return nothing(segment.at(*t), direction) };
+                curved_point(data, shape, &point_of(shape, segment.at(*t)), direction, *surface)
+            }
         }
     }
+
+    /// What of light that travels in `direction` passes the veil that a segment meets.
+    pub(crate) fn passes(&self, met: &Met, segment: &Segment, direction: DVec3) -> Rgb {
+        let shading = self.shading(&self.surface_at(met, segment, direction), direction);
+        shading.map_or(Rgb::ZERO, |s| self.materials[s.material as usize].material.passes(s.wi, s.uv))
+    }
+
+    /// What scattering at a point depends on, for a path that comes in `direction`; `None` at a plain one.
+    #[inline(never)]
+    pub(crate) fn shading(&self, point: &SurfacePoint, direction: DVec3) -> Option<ShadingPoint> {
+        let place = point.place?;
+        let data = &self.surfaces[place.surface as usize];
+        let material = data.shading?;
+        if let Some(shape) = &data.curved {
+            let at = point_of(shape, point.point);
+            let (uv, along) = parametrization(shape, at.local);
+            let frame = frame(at.normal, Some(along));
+            return Some(ShadingPoint { material, uv, wi: local(&frame, -direction), frame, lift: curved_lift(shape) });
+        }
+        let index = (data.first_triangle + place.triangle) as usize;
+        let triangle = match &self.others {
+            Some(others) if data.veil => others.veil_triangle(index)?,
+            _ => self.triangles.get(index)?,
+        };
+        Some(self.shade_triangle(material, triangle, &place, direction))
+    }
+
+    fn shade_triangle(&self, shading: u32, triangle: &Triangle, place: &Place, direction: DVec3) -> ShadingPoint {
+        let MeshAttributes { normals, uvs } = &*self.materials[shading as usize].attributes;
+        let number = place.triangle as usize;
+        let [wb, wc] = place.barycentric;
+        let wa = 1.0 - wb - wc;
+        let own = triangle.area_normal().normalize_or(-direction);
+        let normal = normals.get(number).map_or(own, |n| {
+            let [a, b, c] = n.map(|n| n.as_dvec3());
+            (a * wa + b * wb + c * wc).normalize_or(own)
+        });
+        let (uv, along) = match uvs.get(number) {
+            None => (Vec2::ZERO, None),
+            Some(&[a, b, c]) => {
+                let at = a.as_dvec2() * wa + b.as_dvec2() * wb + c.as_dvec2() * wc;
+                // ∂p/∂u, from p and (u, v) at the corners.
+                let [p, q, r] = triangle.vertices_f64();
+                let (du, dv) = ((b - a).as_dvec2(), (c - a).as_dvec2());
+                let determinant = du.perp_dot(dv);
+                let along = (q - p) * dv.y - (r - p) * du.y;
+                (at.as_vec2(), (determinant != 0.0).then(|| along * determinant.signum()))
+            }
+        };
+        let frame = frame(normal, along);
+        ShadingPoint { material: shading, uv, wi: local(&frame, -direction), frame, lift: lift(triangle) }
+    }
+}
+
+/// A point of a triangle, as if it were plain.
+#[inline(always)]
+fn triangle_point(
+    data: &SurfaceData,
+    triangle: &Triangle,
+    hit: &Hit,
+    direction: DVec3,
+    at: TrianglePlace,
+) -> SurfacePoint {
+    let [a, b, c] = triangle.vertices_f64();
+    let [wa, wb, wc] = hit.barycentric;
+    // Exact predicates can hit so thin a triangle that its rounded normal is zero.
+    let normal = triangle.area_normal().normalize_or(-direction);
+    let front = direction.dot(normal) < 0.0;
+    let normal = if front { normal } else { -normal };
+    SurfacePoint {
+        point: a * wa + b * wb + c * wc + normal * lift(triangle),
+        normal,
+        reflectance: if front { data.front } else { data.back },
+        emitted: if front { data.radiance } else { Rgb::ZERO },
+        emitter: data.emitter,
+        place: data.shading.map(|_| Place { surface: at.surface, triangle: at.number, barycentric: [wb, wc] }),
+    }
+}
+
+/// The point of a shape that is nearest to a place on it that was rounded.
+fn point_of(shape: &CurvedShape, place: DVec3) -> CurvedPoint {
+    let local = shape.snapped(shape.to_local(place));
+    CurvedPoint { point: shape.to_world(local), normal: shape.normal(local), local }
+}
+
+fn curved_point(
+    data: &SurfaceData,
+    shape: &CurvedShape,
+    at: &CurvedPoint,
+    direction: DVec3,
+    surface: u32,
+) -> SurfacePoint {
+    let front = direction.dot(at.normal) < 0.0;
+    let normal = if front { at.normal } else { -at.normal };
+    SurfacePoint {
+        point: at.point + normal * curved_lift(shape),
+        normal,
+        reflectance: if front { data.front } else { data.back },
+        emitted: if front { data.radiance } else { Rgb::ZERO },
+        emitter: data.emitter,
+        place: data.shading.map(|_| Place { surface, triangle: 0, barycentric: [0.0; 2] }),
+    }
+}
+
+/// A black point, for what cannot be.
+fn nothing(point: DVec3, direction: DVec3) -> SurfacePoint {
+    let (reflectance, emitted) = (Rgb::ZERO, Rgb::ZERO);
+    SurfacePoint { point, normal: -direction, reflectance, emitted, emitter: None, place: None }
+}
+
+/// Texture coordinates as Mitsuba has them, and the direction in which u grows, in the world.
+fn parametrization(shape: &CurvedShape, p: DVec3) -> (Vec2, DVec3) {
+    let turn = (p.y.atan2(p.x) / TAU).rem_euclid(1.0);
+    let (uv, along) = match shape.kind() {
+        CurvedKind::Sphere => ((turn, p.z.clamp(-1.0, 1.0).acos() / PI), dvec3(-p.y, p.x, 0.0)),
+        CurvedKind::Disk => ((p.x.hypot(p.y), turn), dvec3(p.x, p.y, 0.0)),
+        CurvedKind::Cylinder => ((turn, p.z), dvec3(-p.y, p.x, 0.0)),
+    };
+    (Vec2::new(uv.0 as f32, uv.1 as f32), *shape.placement().0 * along)
+}
+
+/// A frame about a normal whose first axis goes along with `along`, if that leads anywhere.
+fn frame(normal: DVec3, along: Option<DVec3>) -> [DVec3; 3] {
+    let flat = along.map(|a| a - normal * a.dot(normal)).and_then(DVec3::try_normalize);
+    let first = flat.unwrap_or_else(|| normal.any_orthonormal_vector());
+    [first, normal.cross(first), normal]
+}
+
+fn local(frame: &[DVec3; 3], d: DVec3) -> DVec3 {
+    dvec3(frame[0].dot(d), frame[1].dot(d), frame[2].dot(d))
+}
+
+/// As [`lift`]; a point of a curved shape is off it by the rounding of the map to the world, below 2⁻⁴⁹ of the largest coordinate and the error of
+/// the map, 10⁻¹² of the shape's size: a hundredth of this.
+pub(crate) fn curved_lift(shape: &CurvedShape) -> f64 {
+    shape.bounds().largest_coordinate() * (1.0 / 4_294_967_296.0)
 }
 
 /// How far a ray starts from the triangle that it leaves, in world units: more than the rounding of a hit's position, and nothing beside a
@@ -129,7 +370,10 @@ pub(crate) fn lift(triangle: &Triangle) -> f64 {
 
 /// The point emitters' positions.
 fn positions(scene: &Scene) -> impl Iterator<Item = DVec3> {
-    scene.emitters.iter().filter_map(|e| if let Emitter::Point { position, .. } = e { Some(*position) } else { None })
+    scene.emitters.iter().filter_map(|e| match e {
+        Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(*position),
+        _ => None,
+    })
 }
 
 /// The bounds of the occluders, and of the point emitters that are no farther from them than half their longest side: those get
@@ -149,9 +393,10 @@ fn occluder_bounds(scene: &Scene, bvh: &Bvh, all: Bounds) -> Bounds {
 #[must_use]
 pub fn light_shapes(scene: &Scene) -> Vec<LightShape<'_>> {
     let shape = |emitter: &Emitter| match *emitter {
-        Emitter::Point { position, .. } => LightShape::Point(position),
+        Emitter::Point { position, .. } | Emitter::Spot { position, .. } => LightShape::Point(position),
+        // A curved one has no triangles: nothing is kept for it.
         Emitter::Area { surface } => LightShape::Area(&scene.surfaces[surface].triangles),
-        Emitter::Constant { .. } => LightShape::Infinite,
+        Emitter::Directional { .. } | Emitter::Constant { .. } | Emitter::Envmap { .. } => LightShape::Infinite,
     };
     scene.emitters.iter().map(shape).collect()
 }

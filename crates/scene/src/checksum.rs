@@ -1,11 +1,12 @@
 //! A checksum of a scene, by which an image can say which scene it shows.
 
 use glam::DVec3;
-use vdf_geometry::Triangle;
+use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
 
 use crate::{
-    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor, Phase, PixelRect,
-    ReconstructionFilter, Rgb, Scene, Surface,
+    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes, Microfacets,
+    PerspectiveSensor, Phase, PixelRect, Pixels, ReconstructionFilter, Rgb, Roughness, Scene, Surface, Texture,
+    TextureFilter, UvTransform, Wrap,
 };
 
 impl Scene {
@@ -87,16 +88,136 @@ impl Sum {
         }
     }
 
-    fn surface(&mut self, Surface { triangles, bsdf: Bsdf { front, back }, radiance }: &Surface) {
+    fn surface(&mut self, Surface { triangles, curved, attributes, bsdf, radiance }: &Surface) {
         self.triangles(triangles);
-        self.colour(*front);
-        self.colour(*back);
+        self.curved(curved.as_ref());
+        let MeshAttributes { normals, uvs } = &**attributes;
+        // What a scene without them is, it always was.
+        if !normals.is_empty() || !uvs.is_empty() {
+            self.count(normals.len());
+            normals.iter().flatten().for_each(|n| self.colour(*n));
+            self.count(uvs.len());
+            uvs.iter().flatten().for_each(|uv| self.words(&uv.to_array().map(f32::to_bits)));
+        }
+        match bsdf {
+            Bsdf::Lambertian { front, back } => {
+                self.colour(*front);
+                self.colour(*back);
+            }
+            other => self.bsdf(other),
+        }
         self.words(&[u32::from(radiance.is_some())]);
         self.colour(radiance.unwrap_or_default());
     }
 
-    fn boundary(&mut self, Boundary { triangles, interior, exterior }: &Boundary) {
+    fn curved(&mut self, shape: Option<&CurvedShape>) {
+        let Some(shape) = shape else { return };
+        let kind = match shape.kind() {
+            CurvedKind::Sphere => 1,
+            CurvedKind::Disk => 2,
+            CurvedKind::Cylinder => 3,
+        };
+        self.words(&[kind, u32::from(shape.is_flipped())]);
+        let (linear, origin) = shape.placement();
+        self.doubles(&linear.to_cols_array());
+        self.point(origin);
+    }
+
+    fn bsdf(&mut self, bsdf: &Bsdf) {
+        match bsdf {
+            Bsdf::Lambertian { front, back } => {
+                self.words(&[0]);
+                self.colour(*front);
+                self.colour(*back);
+            }
+            Bsdf::Diffuse { .. } => self.words(&[1]),
+            Bsdf::Conductor { eta, k, roughness, .. } => {
+                self.words(&[2]);
+                self.colour(*eta);
+                self.colour(*k);
+                self.roughness(roughness.as_ref());
+            }
+            Bsdf::Dielectric { eta, roughness, .. } => {
+                self.words(&[3]);
+                self.doubles(&[*eta]);
+                self.roughness(roughness.as_ref());
+            }
+            Bsdf::ThinDielectric { eta, .. } => {
+                self.words(&[4]);
+                self.doubles(&[*eta]);
+            }
+            Bsdf::Plastic { eta, nonlinear, roughness, .. } => {
+                self.words(&[5, u32::from(*nonlinear)]);
+                self.doubles(&[*eta]);
+                self.roughness(roughness.as_ref());
+            }
+            Bsdf::TwoSided(of) => {
+                self.words(&[6]);
+                of.iter().for_each(|bsdf| self.bsdf(bsdf));
+            }
+            Bsdf::Blend { of, .. } => {
+                self.words(&[7]);
+                of.iter().for_each(|bsdf| self.bsdf(bsdf));
+            }
+            Bsdf::Mask { of, .. } => {
+                self.words(&[8]);
+                self.bsdf(of);
+            }
+            Bsdf::Null => self.words(&[9]),
+        }
+        // Those of nested models once more, which does no harm.
+        bsdf.textures().into_iter().for_each(|texture| self.texture(texture));
+    }
+
+    fn roughness(&mut self, roughness: Option<&Roughness>) {
+        self.words(&[match roughness.map(|r| r.distribution) {
+            None => 0,
+            Some(Microfacets::Beckmann) => 1,
+            Some(Microfacets::Ggx) => 2,
+        }]);
+    }
+
+    fn texture(&mut self, texture: &Texture) {
+        match texture {
+            Texture::Constant(colour) => {
+                self.words(&[0]);
+                self.colour(*colour);
+            }
+            Texture::Checkerboard { first, second, to_uv } => {
+                self.words(&[1]);
+                self.texture(first);
+                self.texture(second);
+                self.uv_transform(to_uv);
+            }
+            Texture::Bitmap { image, filter, wrap, to_uv } => {
+                let filter = match filter {
+                    TextureFilter::Bilinear => 0,
+                    TextureFilter::Nearest => 1,
+                };
+                let wrap = match wrap {
+                    Wrap::Repeat => 0,
+                    Wrap::Mirror => 1,
+                    Wrap::Clamp => 2,
+                };
+                self.words(&[2, filter, wrap]);
+                self.pixels(image);
+                self.uv_transform(to_uv);
+            }
+        }
+    }
+
+    fn uv_transform(&mut self, UvTransform { columns: [u, v], offset }: &UvTransform) {
+        self.doubles(&[u.x, u.y, v.x, v.y, offset.x, offset.y]);
+    }
+
+    fn pixels(&mut self, Pixels { width, height, rgb }: &Pixels) {
+        self.words(&[*width, *height]);
+        rgb.iter().for_each(|p| self.colour(*p));
+    }
+
+    fn boundary(&mut self, Boundary { triangles, curved, interior, exterior }: &Boundary) {
         self.triangles(triangles);
+        self.curved(curved.as_ref());
         self.option(interior.map(|MediumId(n)| n));
         self.option(exterior.map(|MediumId(n)| n));
     }
@@ -114,27 +235,47 @@ impl Sum {
     }
 
     fn emitter(&mut self, emitter: &Emitter) {
-        match *emitter {
+        match emitter {
             Emitter::Point { position, intensity } => {
                 self.words(&[0]);
-                self.point(position);
-                self.colour(intensity);
+                self.point(*position);
+                self.colour(*intensity);
             }
             Emitter::Area { surface } => {
                 self.words(&[1]);
-                self.count(surface);
+                self.count(*surface);
             }
             Emitter::Constant { radiance } => {
                 self.words(&[2]);
-                self.colour(radiance);
+                self.colour(*radiance);
+            }
+            Emitter::Spot { position, direction, intensity, beam, cutoff } => {
+                self.words(&[3]);
+                self.point(*position);
+                self.point(*direction);
+                self.colour(*intensity);
+                self.doubles(&[*beam, *cutoff]);
+            }
+            Emitter::Directional { direction, irradiance } => {
+                self.words(&[4]);
+                self.point(*direction);
+                self.colour(*irradiance);
+            }
+            Emitter::Envmap { image, scale, world_from_map } => {
+                self.words(&[5, scale.to_bits()]);
+                self.pixels(image);
+                self.doubles(&world_from_map.to_cols_array());
             }
         }
     }
 
     fn sensor(&mut self, sensor: &PerspectiveSensor) {
-        let PerspectiveSensor { world_from_camera, tan_half_fov_x, near_clip, far_clip, medium } = sensor;
+        let PerspectiveSensor { world_from_camera, tan_half_fov_x, near_clip, far_clip, lens, medium } = sensor;
         self.doubles(&world_from_camera.to_cols_array());
         self.doubles(&[*tan_half_fov_x, *near_clip, *far_clip]);
+        if let Some(Lens { radius, focus_distance }) = lens {
+            self.doubles(&[*radius, *focus_distance]);
+        }
         self.option(medium.map(|MediumId(n)| n));
     }
 

@@ -1,6 +1,6 @@
 //! Scenes: what a file describes, resolved, checked and ready to render.
 //!
-//! A scene file is a strict subset of Mitsuba 3 XML with OBJ meshes. [`Scene::load`] reads one; everything that is not in the subset is a
+//! A scene file is a strict subset of Mitsuba 3 XML, with meshes as OBJ, PLY or `serialized` and pictures in the usual formats. [`Scene::load`] reads one; everything that is not in the subset is a
 //! [`SceneError`] with file, line and column. This crate knows nothing of voxels, of methods of acceleration or of a command line.
 //!
 //! ```
@@ -24,21 +24,28 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+mod bsdf;
 mod checksum;
 mod error;
 mod load;
+mod mesh;
 mod model;
 mod obj;
+mod ply;
+mod serialized;
 mod source;
 mod text;
+mod texture;
 
+pub use bsdf::{Bsdf, Microfacets, Roughness};
 pub use error::SceneError;
 pub use load::LoadOptions;
 pub use model::{
-    Boundary, Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Medium, MediumId, PerspectiveSensor,
-    Phase, PixelRect, ReconstructionFilter, Scene, Surface,
+    Boundary, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes,
+    PerspectiveSensor, Phase, PixelRect, ReconstructionFilter, Scene, Surface,
 };
 pub use source::{EmbeddedFile, SceneSource};
+pub use texture::{Pixels, Texture, TextureFilter, UvTransform, Wrap, luminance};
 
 /// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.
 pub type Rgb = glam::Vec3;

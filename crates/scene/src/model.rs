@@ -1,9 +1,11 @@
 //! Plain data: a scene as the renderer sees it.
 
-use glam::{DMat4, DVec3};
-use vdf_geometry::Triangle;
+use std::sync::Arc;
 
-use crate::Rgb;
+use glam::{DMat4, DVec3, Vec2, Vec3};
+use vdf_geometry::{CurvedShape, Triangle};
+
+use crate::{Bsdf, Pixels, Rgb};
 
 /// Index into [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,9 +14,9 @@ pub struct MediumId(pub u32);
 /// Everything that is needed to render, with all names resolved and all transforms applied.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The opaque shapes: the occluders.
+    /// The shapes that light does not just pass: the occluders.
     pub surfaces: Vec<Surface>,
-    /// The shapes with a `null` BSDF: they never block, they only change the medium.
+    /// The shapes that change the medium. One with a `null` BSDF does nothing else; any other is among the surfaces, too.
     pub boundaries: Vec<Boundary>,
     /// The participating media.
     pub media: Vec<Medium>,
@@ -34,34 +36,38 @@ pub struct Scene {
     pub warnings: Vec<String>,
 }
 
-/// An opaque shape.
-#[derive(Clone, Debug)]
+/// A shape that light does not just pass: an occluder.
+#[derive(Clone, Debug, Default)]
 pub struct Surface {
     /// The shape's triangles, in world units.
     pub triangles: Vec<Triangle>,
-    /// How it reflects.
+    /// The shape itself if it is curved; then it has no triangles.
+    pub curved: Option<CurvedShape>,
+    /// What the corners of the triangles carry.
+    pub attributes: Arc<MeshAttributes>,
+    /// How it scatters.
     pub bsdf: Bsdf,
     /// Radiance emitted from the front side (the side of the normal), if the shape is an area emitter. Such a
     /// surface also has an [`Emitter::Area`] in [`Scene::emitters`].
     pub radiance: Option<Rgb>,
 }
 
-/// A Lambertian reflector, each side with its own reflectance; black where a side does not reflect.
-///
-/// Mitsuba's `diffuse` has a black back; `twosided` puts a `diffuse` on each side.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bsdf {
-    /// Reflectance of the side of the normal, each channel in [0, 1].
-    pub front: Rgb,
-    /// Reflectance of the other side, each channel in [0, 1].
-    pub back: Rgb,
+/// What the corners of a mesh's triangles carry beside their places, triangle by triangle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshAttributes {
+    /// Unit normals for shading, in world space; empty where the triangles' own normals shade.
+    pub normals: Vec<[Vec3; 3]>,
+    /// Texture coordinates; empty if there are none.
+    pub uvs: Vec<[Vec2; 3]>,
 }
 
 /// A surface between two media, index-matched: light passes it unchanged.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Boundary {
     /// The shape's triangles, in world units.
     pub triangles: Vec<Triangle>,
+    /// The shape itself if it is a sphere; then it has no triangles.
+    pub curved: Option<CurvedShape>,
     /// The medium behind the surface (against the normal); `None` is vacuum.
     pub interior: Option<MediumId>,
     /// The medium in front of the surface (along the normal); `None` is vacuum.
@@ -92,7 +98,7 @@ pub enum Phase {
 }
 
 /// A light source.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Emitter {
     /// A point that radiates equally in all directions.
     Point {
@@ -100,6 +106,26 @@ pub enum Emitter {
         position: DVec3,
         /// Radiant intensity in W/sr.
         intensity: Rgb,
+    },
+    /// A point that radiates into a cone; the intensity falls linearly in the angle from the beam to the cutoff.
+    Spot {
+        /// Position in world units.
+        position: DVec3,
+        /// Unit vector, the middle of the cone.
+        direction: DVec3,
+        /// Radiant intensity in W/sr within the beam.
+        intensity: Rgb,
+        /// Half the angle of the full beam in radians.
+        beam: f64,
+        /// Half the angle beyond which there is no light, in radians; not less than `beam`.
+        cutoff: f64,
+    },
+    /// Parallel light from infinitely far away.
+    Directional {
+        /// Unit vector in which the light travels.
+        direction: DVec3,
+        /// Power per area at right angles to the direction.
+        irradiance: Rgb,
     },
     /// The front side of a surface.
     Area {
@@ -111,9 +137,18 @@ pub enum Emitter {
         /// Radiance.
         radiance: Rgb,
     },
+    /// Radiance from a picture of all directions, infinitely far away.
+    Envmap {
+        /// Columns go round: the first and the last are neighbours; the middle is +Z of the map, the upper row +Y.
+        image: Arc<Pixels>,
+        /// What the pixels are multiplied with.
+        scale: f32,
+        /// From the map's directions to the world's; a rotation.
+        world_from_map: DMat4,
+    },
 }
 
-/// A pinhole camera.
+/// A camera with a pinhole or a thin lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PerspectiveSensor {
     /// Camera to world: +X is left in the image, +Y up, +Z forward; a rigid transform.
@@ -124,8 +159,19 @@ pub struct PerspectiveSensor {
     pub near_clip: f64,
     /// Rays end on this plane, in world units along +Z.
     pub far_clip: f64,
+    /// The lens, if it is no pinhole.
+    pub lens: Option<Lens>,
     /// The medium around the camera; `None` is vacuum.
     pub medium: Option<MediumId>,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Radius of the aperture in world units; positive.
+    pub radius: f64,
+    /// Distance along +Z at which the picture is sharp, in world units; positive.
+    pub focus_distance: f64,
 }
 
 /// The image that is recorded.

@@ -2,7 +2,12 @@
 
 use std::collections::HashSet;
 
-use vdf_scene::{LoadOptions, Phase, ReconstructionFilter, Rgb, Scene};
+use std::sync::Arc;
+
+use glam::{DMat4, Vec3};
+use vdf_scene::{
+    Bsdf, Emitter, Lens, LoadOptions, MeshAttributes, Phase, Pixels, ReconstructionFilter, Rgb, Scene, Texture,
+};
 use vdf_scenes::builtin;
 
 fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
@@ -21,12 +26,12 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         change(&mut changed);
         assert_eq!(changed.checksum(), scene.checksum());
     }
-    let other: [fn(&mut Scene); 17] = [
+    let other: [fn(&mut Scene); 23] = [
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
-        |s| s.surfaces[0].bsdf.front.y = 0.125,
-        |s| s.surfaces[0].bsdf.back.y = 0.125,
+        |s| s.surfaces[0].bsdf = Bsdf::lambertian(Vec3::splat(0.125), Vec3::ZERO),
+        |s| s.surfaces[0].bsdf = Bsdf::lambertian(Vec3::ZERO, Vec3::splat(0.125)),
         |s| s.surfaces[0].radiance = Some(Rgb::ZERO),
         |s| drop(s.surfaces.pop()),
         |s| s.boundaries[0].interior = None,
@@ -39,6 +44,15 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.film.width += 1,
         |s| s.film.filter = ReconstructionFilter::Gaussian { stddev: 0.625 },
         |s| s.integrator.max_depth = Some(77),
+        |s| s.surfaces[0].bsdf = Bsdf::Diffuse { reflectance: Texture::grey(0.125) },
+        |s| s.surfaces[0].bsdf = Bsdf::Null,
+        |s| s.surfaces[0].attributes = Arc::new(MeshAttributes { normals: vec![[Vec3::X; 3]], uvs: vec![] }),
+        |s| s.sensor.lens = Some(Lens { radius: 1.0, focus_distance: 2.0 }),
+        |s| s.emitters.push(Emitter::Directional { direction: glam::DVec3::X, irradiance: Rgb::ONE }),
+        |s| {
+            let image = Arc::new(Pixels { width: 2, height: 2, rgb: vec![Rgb::ONE; 4] });
+            s.emitters.push(Emitter::Envmap { image, scale: 1.0, world_from_map: DMat4::IDENTITY });
+        },
     ];
     let sums: HashSet<_> = other
         .iter()

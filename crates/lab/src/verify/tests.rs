@@ -21,8 +21,9 @@ fn scene() -> Scene {
                 Triangle::new(v(0.0, 0.0), v(1.0, 0.0), v(1.0, 1.0)),
                 Triangle::new(v(0.0, 0.0), v(1.0, 1.0), v(0.0, 1.0)),
             ],
-            bsdf: Bsdf { front: white, back: white },
+            bsdf: Bsdf::lambertian(white, white),
             radiance: None,
+            ..Surface::default()
         }],
         boundaries: vec![],
         media: vec![],
@@ -32,6 +33,7 @@ fn scene() -> Scene {
             tan_half_fov_x: 1.0,
             near_clip: 0.1,
             far_clip: 10.0,
+            lens: None,
             medium: None,
         },
         film: FilmSettings {

@@ -110,7 +110,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let place = lights.sample_point(choice.emitter, [0.0; 2]);
             let Some(light) = place.and_then(|place| lights.seen_from(point, &place)) else { continue };
             let vertex = Vertex::InMedium { phase: stretch.phase, direction: fog.direction };
-            let (value, _) = vertex.eval(light.direction);
+            let (value, _) = vertex.eval(self.world, light.direction);
             let value = value * light.weight * stretch.albedo;
             if value.max_element() <= 0.0 {
                 continue;

@@ -99,6 +99,11 @@ impl<R: Recorder> Tracer<'_, R> {
                     path.on_surface = false;
                     path.ray = self.ray(point, to, regions);
                 }
+                Event::Arrival { surface: Some(surface), regions } if surface.place.is_some() => {
+                    if !self.arrive(&mut path, Some(surface), regions, sampler, counters) {
+                        break;
+                    }
+                }
                 Event::Arrival { surface, regions } => {
                     let Some(surface) = self.light_at_end(&mut path, surface) else { break };
                     let vertex = Vertex::OnSurface(surface);
@@ -120,7 +125,7 @@ impl<R: Recorder> Tracer<'_, R> {
                         );
                     let u = sampler.next_2d();
                     let to = mixture.sample(u).unwrap_or_else(|| sample_diffuse(surface.normal, u).0);
-                    let (_, cosine) = vertex.eval(to);
+                    let (_, cosine) = vertex.eval(self.world, to);
                     let pdf = mixture.pdf(to, cosine);
                     if pdf <= 0.0 {
                         break;
@@ -212,7 +217,7 @@ impl<R: Recorder> Tracer<'_, R> {
         let depth = to_light.length() / mean_free_path;
         let share = match vertex {
             Vertex::InMedium { .. } => IN_MEDIUM / (1.0 + depth),
-            Vertex::OnSurface(_) => ON_SURFACE * depth / ((1.0 + depth) * (1.0 + depth)),
+            Vertex::OnSurface(_) | Vertex::OnMaterial(..) => ON_SURFACE * depth / ((1.0 + depth) * (1.0 + depth)),
         };
         Mixture { axis, share, u }
     }

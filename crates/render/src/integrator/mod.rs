@@ -5,10 +5,11 @@ mod kind;
 mod lit;
 mod mixture;
 mod raymarch;
+mod surfaces;
 mod volpath;
 
 use glam::DVec3;
-use vdf_geometry::Segment;
+use vdf_geometry::{Hit, Segment};
 use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
@@ -16,7 +17,7 @@ pub use self::kind::{Integrator, UnknownIntegrator};
 use crate::{
     Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler, TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
-    world::{SurfacePoint, World},
+    world::{ShadingPoint, SurfacePoint, World},
 };
 
 /// What the integrators work with: a scene, and who answers its visibility queries.
@@ -52,6 +53,8 @@ enum Origin {
     Camera,
     /// A scattering event at `point` that drew the direction with density `pdf` and also sampled the emitters.
     Scattering { point: DVec3, pdf: f64 },
+    /// A mirror or a lens, which sends light in one direction only: no emitter sampling competes.
+    Delta,
 }
 
 /// A path under way from the camera.
@@ -72,6 +75,9 @@ struct Path {
     /// The part of the throughput that is there only because the path was drawn from mixtures: small where light is expected. Roulette leaves it
     /// alone, or it would kill what was just aimed at the light.
     aim: f64,
+    /// The square of the index of refraction that the path is in, over that where it began: so much less radiance is worth there. Roulette leaves it
+    /// alone, or it would kill what goes into glass.
+    compression: f32,
     /// Light gathered so far.
     radiance: Rgb,
 }
@@ -86,6 +92,7 @@ impl Path {
             crossings: 0,
             throughput: Rgb::ONE,
             aim: 1.0,
+            compression: 1.0,
             radiance: Rgb::ZERO,
         }
     }
@@ -93,9 +100,15 @@ impl Path {
 
 /// The end of a path so far, where light may be gathered.
 #[derive(Clone, Copy, Debug)]
-enum Vertex {
-    InMedium { phase: Phase, direction: DVec3 },
+enum Vertex<'a> {
+    InMedium {
+        phase: Phase,
+        direction: DVec3,
+    },
+    /// A plain Lambertian surface.
     OnSurface(SurfacePoint),
+    /// Any other one.
+    OnMaterial(&'a SurfacePoint, &'a ShadingPoint),
 }
 
 impl<R: Recorder> Tracer<'_, R> {
@@ -117,12 +130,16 @@ impl<R: Recorder> Tracer<'_, R> {
         }
     }
 
-    /// The ray of a camera at `position` along `segment`, which begins on the near plane. A far plane ends it only in the medium in which it
+    /// The ray of a camera at `centre` from a point of its lens along `segment`, which begins on the near plane. A far plane ends it only in the medium in which it
     /// starts: as in Mitsuba 3, a ray that has passed a medium boundary goes on to infinity.
     #[inline]
-    pub(crate) fn camera_ray(&self, position: DVec3, segment: Segment, direction: DVec3) -> PathRay {
+    pub(crate) fn camera_ray(&self, centre: DVec3, position: DVec3, segment: Segment, direction: DVec3) -> PathRay {
         let media = &self.world.media;
-        let regions = media.at_end(&Segment::new(position, segment.p), media.at_camera());
+        let mut regions = media.at_end(&Segment::new(position, segment.p), media.at_camera());
+        if position != centre {
+            let on_lens = media.at_end(&Segment::new(centre, position), media.at_camera());
+            regions = media.at_end(&Segment::new(position, segment.p), &on_lens);
+        }
         let segment = if self.world.far_plane_clips && !media.crosses_nothing(&segment) {
             Segment::new(segment.p, segment.p + direction * self.world.lights.reach())
         } else {
@@ -163,12 +180,19 @@ impl<R: Recorder> Tracer<'_, R> {
     /// The first occluder on the ray, and the part of the ray before it. That ends at the very point from which the next ray starts.
     #[inline]
     fn cast(&self, ray: &PathRay, counters: &mut Counters) -> (Option<SurfacePoint>, Segment) {
-        match self.visibility.intersect(&ray.segment, counters) {
-            Some(hit) => {
-                let surface = self.world.surface_point(&hit, ray.direction);
-                (Some(surface), Segment::new(ray.segment.p, surface.point))
-            }
+        let hit = self.visibility.intersect(&ray.segment, counters);
+        match self.surface_met(hit, &ray.segment, ray.direction) {
+            Some(surface) => (Some(surface), Segment::new(ray.segment.p, surface.point)),
             None => (None, ray.segment),
+        }
+    }
+
+    /// The first surface on a segment in this direction, of whose opaque triangles `hit` is the first.
+    #[inline]
+    pub(crate) fn surface_met(&self, hit: Option<Hit>, segment: &Segment, direction: DVec3) -> Option<SurfacePoint> {
+        match &self.world.others {
+            None => hit.map(|hit| self.world.surface_point(&hit, direction)),
+            Some(others) => self.first_of_all(others, hit, segment, direction),
         }
     }
 
@@ -183,6 +207,9 @@ impl<R: Recorder> Tracer<'_, R> {
         sampler: &mut Sampler,
         counters: &mut Counters,
     ) -> bool {
+        if let Some(surface) = surface.as_ref().filter(|s| s.place.is_some()) {
+            return self.arrive_at_material(path, surface, regions, sampler, counters);
+        }
         let Some(surface) = self.light_at_end(path, surface) else { return false };
         let vertex = Vertex::OnSurface(surface);
         path.radiance += path.throughput * self.direct_light(surface.point, &vertex, &regions, sampler, counters);
@@ -198,7 +225,7 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline]
     fn light_at_end(&self, path: &mut Path, surface: Option<SurfacePoint>) -> Option<SurfacePoint> {
         let Some(surface) = surface else {
-            path.radiance += path.throughput * self.background(&path.origin);
+            path.radiance += path.throughput * self.background(path.ray.direction, &path.origin);
             return None;
         };
         path.radiance += path.throughput * self.emitted(&surface, path.ray.direction, &path.origin);
@@ -266,27 +293,39 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline]
     fn connect(
         &self,
-        point: DVec3,
+        from: DVec3,
         vertex: &Vertex,
         regions: &RegionSet,
         light: &LightSample,
         flight: Option<f64>,
         counters: &mut Counters,
     ) -> Option<(Rgb, f64, f64)> {
-        let (value, pdf) = vertex.eval(light.direction);
+        let (value, pdf) = vertex.eval(self.world, light.direction);
         let value = value * light.weight;
         if value.max_element() <= 0.0 {
             return None;
         }
+        let (point, through);
+        let (point, regions) = match vertex {
+            Vertex::OnMaterial(s, shading) if light.direction.dot(s.normal) < 0.0 => {
+                (point, through) = self.behind(s, shading, regions);
+                (point, &through)
+            }
+            _ => (from, regions),
+        };
         let kind = match vertex {
             Vertex::InMedium { .. } if light.on_surface => QueryKind::OnLight,
             Vertex::InMedium { .. } => QueryKind::Spatial,
-            Vertex::OnSurface(_) => QueryKind::Superficial,
+            Vertex::OnSurface(_) | Vertex::OnMaterial(..) => QueryKind::Superficial,
         };
         let query = ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind };
         if !self.visibility.unoccluded(&query, counters) {
             return None;
         }
+        let value = match &self.world.others {
+            None => value,
+            Some(others) => value * self.passes(others, &Segment::new(point, light.point), light.direction)?,
+        };
         Some((value * self.transmittance_to(point, light, regions, flight), light.pdf, pdf))
     }
 
@@ -302,11 +341,11 @@ impl<R: Recorder> Tracer<'_, R> {
 
     /// Light of the background that a ray meets when it leaves the scene, weighted against emitter sampling.
     #[inline]
-    fn background(&self, origin: &Origin) -> Rgb {
-        let radiance = self.world.lights.background();
+    fn background(&self, direction: DVec3, origin: &Origin) -> Rgb {
+        let radiance = self.world.lights.background(direction);
         match origin {
             Origin::Scattering { pdf, .. } if radiance != Rgb::ZERO => {
-                radiance * to_f32(power_heuristic(*pdf, self.world.lights.pdf_background()))
+                radiance * to_f32(power_heuristic(*pdf, self.world.lights.pdf_background(direction)))
             }
             _ => radiance,
         }
@@ -333,16 +372,17 @@ impl<R: Recorder> Tracer<'_, R> {
     }
 }
 
-impl Vertex {
+impl Vertex<'_> {
     /// Phase function, or BSDF times cosine, towards `to`; and the density with which direction sampling would draw it.
     #[inline]
-    fn eval(&self, to: DVec3) -> (Rgb, f64) {
+    fn eval(&self, world: &World, to: DVec3) -> (Rgb, f64) {
         match self {
             Self::InMedium { phase, direction } => {
                 let p = phase.pdf_direction(*direction, to);
                 (Rgb::splat(to_f32(p)), p)
             }
             Self::OnSurface(s) => eval_diffuse(s.normal, s.reflectance, to),
+            Self::OnMaterial(_, shading) => surfaces::eval(world, shading, to),
         }
     }
 }
@@ -401,7 +441,7 @@ fn survives(path: &mut Path, roulette: Roulette, rr_depth: u32, sampler: &mut Sa
         return true;
     }
     let endless = thesis || path.on_surface || path.depth > MANY_EVENTS || path.ray.regions.is_empty();
-    let worth = path.throughput.max_element() / to_f32(path.aim);
+    let worth = path.throughput.max_element() * path.compression / to_f32(path.aim);
     let q = worth.min(if endless { MAX_SURVIVAL } else { 1.0 });
     if sampler.next_1d() >= f64::from(q) {
         return false;

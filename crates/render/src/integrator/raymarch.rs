@@ -57,14 +57,8 @@ impl<R: Recorder> Tracer<'_, R> {
                 let fog = Fog { free: &free, direction: path.ray.direction, intervals: &intervals, tau, samples };
                 let light = match self.estimator {
                     Estimator::Thesis => self.by_transmittance(&fog, sampler, counters),
-                    Estimator::Equiangular => self.towards_lights(
-                        &fog,
-                        &stretches(&intervals, &self.world.media),
-                        lights.all(),
-                        sampler,
-                        counters,
-                    ),
-                    Estimator::Lit => {
+                    // Only of the opaque triangles is known where they leave a ray lit.
+                    Estimator::Lit if self.world.others.is_none() => {
                         let stretches = stretches(&intervals, &self.world.media);
                         let mut light = Rgb::ZERO;
                         if !lights.points().is_empty() {
@@ -75,6 +69,13 @@ impl<R: Recorder> Tracer<'_, R> {
                         }
                         light
                     }
+                    Estimator::Equiangular | Estimator::Lit => self.towards_lights(
+                        &fog,
+                        &stretches(&intervals, &self.world.media),
+                        lights.all(),
+                        sampler,
+                        counters,
+                    ),
                 };
                 path.radiance += path.throughput * light;
             }

@@ -65,11 +65,11 @@ impl<R: Recorder> Tracer<'_, R> {
         if let Some(medium) = start
             && let Some(flight) = media.short_flight(&ray.segment, medium, tau)
         {
-            return match self.visibility.intersect_flight(&flight, !on_surface, counters) {
+            let hit = self.visibility.intersect_flight(&flight, !on_surface, counters);
+            return match self.surface_met(hit, &flight, ray.direction) {
                 // The next ray takes them over.
                 None => Event::Collision { point: flight.q, medium, regions: std::mem::take(&mut ray.regions) },
-                Some(hit) => {
-                    let surface = self.world.surface_point(&hit, ray.direction);
+                Some(surface) => {
                     // The way to the surface is a part of the flight, but where a ray starts from a surface is beside that.
                     let regions = media.at_end(&Segment::new(flight.p, surface.point), &ray.regions);
                     self.crosses_to(path, &regions);

@@ -1,16 +1,20 @@
-//! Area emitters: the front sides of a shape's triangles, drawn uniformly by area.
+//! Area emitters: the front sides of a shape's triangles, or of a curved shape, drawn uniformly by area.
 
-use glam::DVec3;
-use vdf_geometry::Triangle;
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, dvec3};
+use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
 use vdf_scene::Rgb;
 
 use super::LightSample;
-use crate::world::lift;
+use crate::world::{curved_lift, lift};
 
-/// The triangles of one shape that shines.
+/// One shape that shines.
 #[derive(Debug)]
 pub(super) struct AreaLight {
     triangles: Vec<Triangle>,
+    /// In place of triangles.
+    curved: Option<CurvedShape>,
     /// Running sum of the triangles' areas.
     cumulative_area: Vec<f64>,
     radiance: Rgb,
@@ -27,7 +31,7 @@ pub(super) struct AreaPoint {
 }
 
 impl AreaLight {
-    pub(super) fn new(triangles: &[Triangle], radiance: Rgb) -> Self {
+    pub(super) fn new(triangles: &[Triangle], curved: Option<CurvedShape>, radiance: Rgb) -> Self {
         let triangles: Vec<_> = triangles.iter().copied().filter(|t| t.area_normal() != DVec3::ZERO).collect();
         let cumulative_area = triangles
             .iter()
@@ -36,7 +40,8 @@ impl AreaLight {
                 Some(*sum)
             })
             .collect();
-        Self { triangles, cumulative_area, radiance }
+        let cumulative_area = curved.map_or(cumulative_area, |c| vec![curved_area(&c)]);
+        Self { triangles, curved, cumulative_area, radiance }
     }
 
     fn area(&self) -> f64 {
@@ -47,6 +52,14 @@ impl AreaLight {
     #[inline]
     pub(super) fn sample(&self, u: [f64; 2]) -> Option<AreaPoint> {
         (self.area() > 0.0).then(|| {
+            if let Some(shape) = &self.curved {
+                let local = sample_curved(shape.kind(), u);
+                return AreaPoint {
+                    point: shape.to_world(local),
+                    normal: shape.normal(local),
+                    lift: curved_lift(shape),
+                };
+            }
             let (triangle, point) = self.sample_point(u);
             AreaPoint { point, normal: triangle.area_normal().normalize(), lift: lift(triangle) }
         })
@@ -96,5 +109,28 @@ impl AreaLight {
         let root = u0.sqrt();
         let [a, b, c] = self.triangles[i].vertices_f64();
         (&self.triangles[i], a * (1.0 - root) + b * (root * (1.0 - u1)) + c * (root * u1))
+    }
+}
+
+/// The area of a curved shape; of a sphere or cylinder whose axes are equal and at right angles.
+fn curved_area(shape: &CurvedShape) -> f64 {
+    let (m, _) = shape.placement();
+    match shape.kind() {
+        CurvedKind::Sphere => 4.0 * PI * m.determinant().abs().powf(2.0 / 3.0),
+        CurvedKind::Disk => PI * m.x_axis.cross(m.y_axis).length(),
+        CurvedKind::Cylinder => TAU * m.x_axis.length() * m.z_axis.length(),
+    }
+}
+
+/// A point of the canonical shape, uniform over its area.
+fn sample_curved(kind: CurvedKind, [u0, u1]: [f64; 2]) -> DVec3 {
+    let (sin, cos) = (TAU * u1).sin_cos();
+    match kind {
+        CurvedKind::Sphere => {
+            let r = 2.0 * (u0 * (1.0 - u0)).max(0.0).sqrt();
+            dvec3(r * cos, r * sin, 1.0 - 2.0 * u0)
+        }
+        CurvedKind::Disk => dvec3(u0.sqrt() * cos, u0.sqrt() * sin, 0.0),
+        CurvedKind::Cylinder => dvec3(cos, sin, u0),
     }
 }

@@ -2,12 +2,19 @@
 
 mod area;
 mod constant;
+mod directional;
+mod envmap;
 mod point;
+mod spot;
 
 use glam::DVec3;
 use vdf_scene::{Emitter, Rgb, Scene};
 
-use self::area::{AreaLight, AreaPoint};
+use self::{
+    area::{AreaLight, AreaPoint},
+    envmap::EnvmapLight,
+    spot::SpotLight,
+};
 
 /// The emitters of a scene, prepared for sampling.
 #[derive(Debug)]
@@ -18,8 +25,10 @@ pub struct Lights {
     /// The numbers of all, and of those that are no points.
     all: Vec<usize>,
     others: Vec<usize>,
-    /// Radiance from outside the scene; black without a `constant` emitter.
+    /// Radiance from outside the scene but for that of a map; black without a `constant` emitter.
     background: Rgb,
+    /// Number of the environment map, if there is one.
+    envmap: Option<usize>,
     /// How far a direction is followed before it is infinitely far away, in world units.
     reach: f64,
 }
@@ -27,8 +36,11 @@ pub struct Lights {
 #[derive(Debug)]
 enum Light {
     Point { position: DVec3, intensity: Rgb },
+    Spot(SpotLight),
     Area(AreaLight),
+    Directional { direction: DVec3, irradiance: Rgb },
     Constant { radiance: Rgb },
+    Envmap(Box<EnvmapLight>),
 }
 
 /// A point on an emitter as seen from a place in the scene.
@@ -81,9 +93,16 @@ impl Lights {
             .iter()
             .map(|e| match *e {
                 Emitter::Point { position, intensity } => Light::Point { position, intensity },
+                Emitter::Spot { position, direction, intensity, beam, cutoff } => {
+                    Light::Spot(SpotLight { position, direction, intensity, beam, cutoff })
+                }
+                Emitter::Directional { direction, irradiance } => Light::Directional { direction, irradiance },
+                Emitter::Envmap { ref image, scale, ref world_from_map } => {
+                    Light::Envmap(Box::new(EnvmapLight::new(image, scale, world_from_map)))
+                }
                 Emitter::Area { surface } => {
                     let s = &scene.surfaces[surface];
-                    Light::Area(AreaLight::new(&s.triangles, s.radiance.unwrap_or(Rgb::ZERO)))
+                    Light::Area(AreaLight::new(&s.triangles, s.curved, s.radiance.unwrap_or(Rgb::ZERO)))
                 }
                 Emitter::Constant { radiance } => {
                     background += radiance;
@@ -97,14 +116,26 @@ impl Lights {
         };
         let points: Vec<_> = lights.iter().enumerate().filter_map(point).collect();
         let others = (0..lights.len()).filter(|i| points.iter().all(|(point, ..)| point != i)).collect();
-        Self { all: (0..lights.len()).collect(), lights, points, others, background, reach }
+        let envmap = lights.iter().position(|l| matches!(l, Light::Envmap(_)));
+        Self { all: (0..lights.len()).collect(), lights, points, others, background, envmap, reach }
     }
 
-    /// Radiance of a ray that leaves the scene.
+    /// Radiance of a ray that leaves the scene in the unit direction `direction`.
     #[inline]
     #[must_use]
-    pub fn background(&self) -> Rgb {
-        self.background
+    pub fn background(&self, direction: DVec3) -> Rgb {
+        match self.map() {
+            None => self.background,
+            Some(map) => self.background + map.radiance(direction),
+        }
+    }
+
+    #[inline]
+    fn map(&self) -> Option<&EnvmapLight> {
+        match &self.lights[self.envmap?] {
+            Light::Envmap(map) => Some(map),
+            _ => None,
+        }
     }
 
     /// Draws an emitter (each equally likely) and a point on it. `None` if there is no light from there.
@@ -145,9 +176,9 @@ impl Lights {
     #[inline]
     pub(crate) fn sample_point(&self, emitter: usize, u: [f64; 2]) -> Option<EmitterPoint> {
         let place = match &self.lights[emitter] {
-            Light::Point { .. } => Place::Point,
+            Light::Point { .. } | Light::Spot(_) => Place::Point,
             Light::Area(light) => Place::Area(light.sample(u)?),
-            Light::Constant { .. } => Place::Infinite(u),
+            Light::Directional { .. } | Light::Constant { .. } | Light::Envmap(_) => Place::Infinite(u),
         };
         Some(EmitterPoint { emitter, place })
     }
@@ -160,9 +191,14 @@ impl Lights {
             (Light::Point { position, intensity }, _) => point::sample(emitter, *position, *intensity, from, choices),
             (Light::Area(light), Place::Area(place)) => light.seen_from(emitter, from, place, choices),
             (Light::Constant { radiance }, Place::Infinite(u)) => {
-                Some(constant::sample(emitter, from, *u, *radiance, self.pdf_background(), self.reach))
+                Some(constant::sample(emitter, from, *u, *radiance, self.pdf_constant(), self.reach))
             }
-            (Light::Area(_) | Light::Constant { .. }, _) => None,
+            (Light::Spot(light), _) => light.sample(emitter, from, choices),
+            (Light::Directional { direction, irradiance }, _) => {
+                Some(directional::sample(emitter, from, *direction, *irradiance, choices, self.reach))
+            }
+            (Light::Envmap(map), Place::Infinite(u)) => map.sample(emitter, from, *u, choices, self.reach),
+            (Light::Area(_) | Light::Constant { .. } | Light::Envmap(_), _) => None,
         }
     }
 
@@ -170,7 +206,7 @@ impl Lights {
     #[inline]
     pub(crate) fn position(&self, point: &EmitterPoint) -> Option<(DVec3, Option<DVec3>)> {
         match (&self.lights[point.emitter], &point.place) {
-            (Light::Point { position, .. }, _) => Some((*position, None)),
+            (Light::Point { position, .. } | Light::Spot(SpotLight { position, .. }), _) => Some((*position, None)),
             (_, Place::Area(place)) => Some((place.point, Some(place.normal))),
             _ => None,
         }
@@ -180,15 +216,23 @@ impl Lights {
     #[inline]
     pub(crate) fn point_position(&self, emitter: usize) -> Option<DVec3> {
         match self.lights[emitter] {
-            Light::Point { position, .. } => Some(position),
+            Light::Point { position, .. } | Light::Spot(SpotLight { position, .. }) => Some(position),
             _ => None,
         }
     }
 
-    /// The density with which [`Lights::sample`] draws any one direction of any one constant emitter.
+    /// The density with which [`Lights::sample`] draws this direction of the environment map, or of any one constant emitter.
     #[inline]
     #[must_use]
-    pub fn pdf_background(&self) -> f64 {
+    pub fn pdf_background(&self, direction: DVec3) -> f64 {
+        match self.map() {
+            None => self.pdf_constant(),
+            Some(map) => map.pdf(direction) / self.lights.len() as f64,
+        }
+    }
+
+    #[inline]
+    fn pdf_constant(&self) -> f64 {
         0.25 / std::f64::consts::PI / self.lights.len() as f64
     }
 

@@ -1,7 +1,7 @@
 //! Where a medium boundary is, and what that says of a segment without a look at triangles: the usual case of a path inside a box of fog.
 
 use glam::DVec3;
-use vdf_geometry::{Bounds, Segment, Triangle};
+use vdf_geometry::{Bounds, CurvedShape, Segment, Triangle};
 
 /// Where a boundary is, and what that says without a look at its triangles.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +23,11 @@ impl Extent {
             (0..3).any(|k| a[k] == b[k] && b[k] == c[k] && (a[k] == min[k] || a[k] == max[k]))
         };
         Self { bounds, shell: triangles.iter().all(in_a_face), closed_box: is_closed_box(triangles, bounds) }
+    }
+
+    /// Of a sphere: its box says nothing of what is inside.
+    pub(super) fn of_sphere(sphere: &CurvedShape) -> Self {
+        Self { bounds: *sphere.bounds(), shell: false, closed_box: false }
     }
 
     /// True only if the segment starts inside the box and ends outside. Then it meets the boundary, and where it does it leaves: all faces

@@ -24,7 +24,7 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use smallvec::SmallVec;
-use vdf_geometry::{Bounds, Bvh, Segment, Triangle};
+use vdf_geometry::{Bounds, Bvh, CurvedSet, Segment, Triangle};
 use vdf_scene::{Boundary, Medium, MediumId};
 
 use super::{MediumInterval, extent::Extent, shells::shells};
@@ -82,6 +82,9 @@ pub(super) struct Regions {
     triangles: Vec<Triangle>,
     /// For each triangle its region, and whether its normal points inwards.
     faces: Vec<Face>,
+    /// The boundaries that are spheres, and their regions.
+    spheres: CurvedSet,
+    region_of_sphere: Vec<u32>,
     /// Crossings closer than this are at one place, in world units: 2⁻⁴⁰ of the largest coordinate, far more than the rounding of `t`
     /// and far less than the step of single precision there.
     crossing_tolerance: f64,
@@ -112,17 +115,35 @@ impl Regions {
         shells.sort_by(|a, b| a.volume.total_cmp(&b.volume).then(b.place.cmp(&a.place)));
         let (mut triangles, mut faces, mut extents) = (Vec::new(), Vec::new(), Vec::new());
         let (mut inner, mut outer) = (Vec::new(), Vec::new());
+        let (mut spheres, mut region_of_sphere) = (Vec::new(), Vec::new());
         for (shell, region) in shells.into_iter().zip(0..) {
             inner.push(shell.inner);
             outer.push(shell.outer);
-            extents.push(Extent::of(&shell.triangles));
+            extents.push(shell.sphere.map_or_else(|| Extent::of(&shell.triangles), |s| Extent::of_sphere(&s)));
+            if let Some(sphere) = shell.sphere {
+                spheres.push(sphere);
+                region_of_sphere.push(region);
+            }
             faces.extend(shell.inwards.iter().map(|&inwards| Face { region, inwards }));
             triangles.extend(shell.triangles);
         }
         let bvh = Bvh::new(&triangles);
-        let crossing_tolerance = bvh.bounds().largest_coordinate() / (1_u64 << 40) as f64;
-        let mut regions =
-            Self { inner, outer, extents, only: None, ambient: None, bvh, triangles, faces, crossing_tolerance };
+        let spheres = CurvedSet::new(spheres);
+        let all = bvh.bounds().union(*spheres.bounds());
+        let crossing_tolerance = all.largest_coordinate() / (1_u64 << 40) as f64;
+        let mut regions = Self {
+            inner,
+            outer,
+            extents,
+            only: None,
+            ambient: None,
+            bvh,
+            triangles,
+            faces,
+            spheres,
+            region_of_sphere,
+            crossing_tolerance,
+        };
         regions.set_ambient(ambient);
         regions
     }
@@ -165,7 +186,7 @@ impl Regions {
         }
         let mut met = false;
         self.bvh.visit_hits(segment, |_| met = true);
-        !met
+        !met && !self.spheres.occluded(segment)
     }
 
     /// True only if a segment from `p` to `q` starts in the only region, a box in vacuum, and ends outside of it by more than the crossing
@@ -226,11 +247,35 @@ impl Regions {
             let from_front = self.triangles[hit.triangle as usize].is_entered_by(segment);
             crossings.push(Crossing { t: hit.t, region, enters: from_front != inwards });
         });
+        if !self.spheres.is_empty() {
+            self.cross_spheres(segment, &mut crossings);
+        }
         if crossings.len() > 1 {
             crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.region.cmp(&b.region)));
             self.settle(&mut crossings, segment);
         }
         crossings
+    }
+
+    /// A sphere is convex, so that on which sides of it the ends lie says which crossings there are: exactly.
+    fn cross_spheres(&self, segment: &Segment, crossings: &mut Crossings) {
+        self.spheres.visit_hits(segment, |hit| {
+            let (sphere, region) =
+                (&self.spheres.shapes()[hit.shape as usize], self.region_of_sphere[hit.shape as usize]);
+            let [starts_in, ends_in] = [segment.p, segment.q].map(|end| sphere.side(end).is_lt());
+            match (starts_in, ends_in) {
+                (false, true) => crossings.push(Crossing { t: hit.t, region, enters: true }),
+                (true, false) => crossings.push(Crossing { t: hit.t, region, enters: false }),
+                // An end on the sphere is outside.
+                (true, true) => {}
+                (false, false) => {
+                    let [Some(first), Some(second)] = sphere.hits(segment) else { return };
+                    if first < second {
+                        crossings.push(Crossing { t: hit.t, region, enters: hit.t == first });
+                    }
+                }
+            }
+        });
     }
 
     /// Where a boundary is met from both sides at one place, the point half-way to its next crossing tells on which side the segment goes on.
@@ -253,6 +298,9 @@ impl Regions {
     /// Unlike the parity of the crossings of a ray it has no unlucky direction.
     #[cold]
     fn winds_about(&self, region: u32, p: DVec3) -> bool {
+        if let Some(sphere) = self.region_of_sphere.iter().position(|r| *r == region) {
+            return self.spheres.shapes()[sphere].side(p).is_lt();
+        }
         let of_region = self.faces.iter().zip(&self.triangles).filter(|(face, _)| face.region == region);
         let half_angles: f64 = of_region
             .map(|(face, t)| {

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
-use vdf_geometry::{Bounds, Triangle};
+use vdf_geometry::{Bounds, CurvedShape, Triangle};
 use vdf_scene::{Boundary, Medium, MediumId};
 
 /// A closed surface around a region.
@@ -21,6 +21,8 @@ pub(super) struct Shell {
     /// The medium that its boundary names for the other side.
     pub(super) outer: Option<MediumId>,
     pub(super) triangles: Vec<Triangle>,
+    /// In place of triangles.
+    pub(super) sphere: Option<CurvedShape>,
     /// For each triangle whether its normal points inwards.
     pub(super) inwards: Vec<bool>,
 }
@@ -38,7 +40,14 @@ impl Shell {
         let turned = volume < 0.0;
         inwards.iter_mut().for_each(|inwards| *inwards ^= turned);
         let [inner, outer] = if turned { [outside, inside] } else { [inside, outside] };
-        Self { volume: volume.abs(), place, inner, outer, triangles, inwards }
+        Self { volume: volume.abs(), place, inner, outer, triangles, sphere: None, inwards }
+    }
+
+    /// Of a sphere.
+    fn of_sphere(place: usize, sphere: CurvedShape, [inner, outer]: [Option<MediumId>; 2]) -> Self {
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * sphere.placement().0.determinant().abs();
+        let (triangles, inwards) = (Vec::new(), Vec::new());
+        Self { volume, place, inner, outer, triangles, sphere: Some(sphere), inwards }
     }
 }
 
@@ -47,7 +56,10 @@ pub(super) fn shells(media: &[Medium], boundaries: &[Boundary]) -> Vec<Shell> {
     let (closed, open): (Vec<_>, Vec<_>) = boundaries.iter().enumerate().partition(|(_, b)| is_closed(&b.triangles));
     let mut shells: Vec<Shell> = closed
         .into_iter()
-        .map(|(place, b)| Shell::new(place, [b.interior, b.exterior], b.triangles.iter().map(|t| (*t, false))))
+        .map(|(place, b)| match b.curved {
+            Some(sphere) => Shell::of_sphere(place, sphere, [b.interior, b.exterior]),
+            None => Shell::new(place, [b.interior, b.exterior], b.triangles.iter().map(|t| (*t, false))),
+        })
         .collect();
     // The first medium of each value stands for all that are equal to it.
     let first_equal = |id: MediumId| {

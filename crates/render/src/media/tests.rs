@@ -34,7 +34,7 @@ fn cuboid(min: Vec3, max: Vec3, turned: u32) -> Vec<Triangle> {
 
 fn media(triangles: Vec<Triangle>, sigma_t: f64) -> Media {
     let medium = Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
-    Media::new(&[medium], &[Boundary { triangles, interior: Some(FOG), exterior: None }], None)
+    Media::new(&[medium], &[Boundary { triangles, interior: Some(FOG), exterior: None, ..Boundary::default() }], None)
 }
 
 fn is_closed(triangles: &[Triangle]) -> bool {
@@ -159,7 +159,7 @@ fn nobody_is_gone_for_good_where_something_may_come() {
     let segment = Segment::new(dvec3(0.5, 0.5, 0.5), dvec3(0.5, 0.5, 50.0));
     let shape = cuboid(Vec3::ZERO, Vec3::ONE, 0);
     let fog = Medium { sigma_t: 1.0, albedo: Rgb::ONE, phase: Phase::Isotropic };
-    let alone = Boundary { triangles: shape.clone(), interior: Some(FOG), exterior: None };
+    let alone = Boundary { triangles: shape.clone(), interior: Some(FOG), exterior: None, ..Boundary::default() };
     assert!(Media::new(&[fog], std::slice::from_ref(&alone), None).leaves_for_good(&segment, FOG, 2.0));
     assert!(!Media::new(&[fog], std::slice::from_ref(&alone), Some(FOG)).leaves_for_good(&segment, FOG, 2.0));
     let behind = Boundary { triangles: cuboid(vec3(0.0, 0.0, 3.0), vec3(1.0, 1.0, 9.0), 0), ..alone.clone() };

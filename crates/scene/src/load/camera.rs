@@ -6,7 +6,7 @@ use super::document::Element;
 use super::properties::Object;
 use super::{Loader, features, film, objects};
 use crate::SceneError;
-use crate::{FilmSettings, PerspectiveSensor};
+use crate::{FilmSettings, Lens, PerspectiveSensor};
 
 /// A matrix written with three digits is this far from a rotation in the products of its columns; a scale of 0.1 % is farther.
 const MOST_SCALE: f64 = 2e-3;
@@ -27,15 +27,13 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let mut object = Object::new(loader, element, features::kinds("sensor"))?;
     let world_from_camera = object.world_transform(loader)?;
     let world_from_camera = rigid(loader, &object, world_from_camera)?;
-    object.without_effect(
-        loader,
-        &["focus_distance", "shutter_open", "shutter_close", "sample_border", "use_radiance"],
-    )?;
+    object.without_effect(loader, &["shutter_open", "shutter_close", "sample_border", "use_radiance"])?;
     for name in ["principal_point_offset_x", "principal_point_offset_y"] {
         object.float_where(name, 0.0, |v| v == 0.0, "0: nothing else is supported")?;
     }
     let near_clip = object.float_where("near_clip", 0.01, |v| v > 0.0, "positive")?;
     let far_clip = object.float_where("far_clip", 1e4, |v| v > near_clip, "more than near_clip")?;
+    let lens = lens(loader, &mut object, far_clip)?;
     let Some(film) = object.at_most_one("film")? else {
         return Err(object.error("no film", "add <film type=\"hdrfilm\"> to the sensor"));
     };
@@ -50,7 +48,7 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     };
     let tan_half_fov_x = field_of_view(&mut object, f64::from(film.width) / f64::from(film.height))?;
     object.finish()?;
-    let sensor = PerspectiveSensor { world_from_camera, tan_half_fov_x, near_clip, far_clip, medium };
+    let sensor = PerspectiveSensor { world_from_camera, tan_half_fov_x, near_clip, far_clip, lens, medium };
     Ok(Camera { sensor, film, sample_count, seed })
 }
 
@@ -76,6 +74,19 @@ fn rigid(loader: &Loader<'_>, object: &Object<'_>, m: DMat4) -> Result<DMat4, Sc
     // A mirroring stays one.
     let up = forward.cross(left) * linear.determinant().signum();
     Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), forward.extend(0.0), m.w_axis))
+}
+
+fn lens(loader: &Loader<'_>, object: &mut Object<'_>, far_clip: f64) -> Result<Option<Lens>, SceneError> {
+    if object.kind() != "thinlens" {
+        object.without_effect(loader, &["focus_distance"])?;
+        return Ok(None);
+    }
+    if !object.has("aperture_radius") {
+        return Err(object.error("no aperture_radius", "add <float name=\"aperture_radius\" …>, or use perspective"));
+    }
+    let radius = object.float_where("aperture_radius", 0.0, |v| v >= 0.0, "at least 0")?;
+    let focus_distance = object.float_where("focus_distance", far_clip, |v| v > 0.0, "positive")?;
+    Ok((radius > 0.0).then_some(Lens { radius, focus_distance }))
 }
 
 /// tan(X/2), X the horizontal field of view.

@@ -9,8 +9,8 @@ use super::names;
 use crate::SceneError;
 
 /// Elements that describe an object, with a plugin `type`.
-pub(super) const OBJECT_TAGS: [&str; 9] =
-    ["bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "sensor"];
+pub(super) const OBJECT_TAGS: [&str; 10] =
+    ["bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "sensor", "texture"];
 /// Elements that describe a property.
 pub(super) const PROPERTY_TAGS: [&str; 7] = ["boolean", "float", "integer", "rgb", "spectrum", "string", "transform"];
 

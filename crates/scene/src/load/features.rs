@@ -9,15 +9,28 @@ use crate::SceneError;
 use crate::text::quoted;
 
 /// Objects of Mitsuba's that are known, but not read at all.
-pub(super) const FOREIGN_TAGS: [&str; 2] = ["texture", "volume"];
+pub(super) const FOREIGN_TAGS: [&str; 1] = ["volume"];
 /// More features are counted, not named.
 const MOST_NAMED: usize = 12;
 
 /// The plugins that are read for objects of that tag.
 pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
     match tag {
-        "bsdf" => &["diffuse", "twosided", "null"],
-        "emitter" => &["point", "constant", "area"],
+        "bsdf" => &[
+            "diffuse",
+            "dielectric",
+            "roughdielectric",
+            "thindielectric",
+            "conductor",
+            "roughconductor",
+            "plastic",
+            "roughplastic",
+            "twosided",
+            "mask",
+            "blendbsdf",
+            "null",
+        ],
+        "emitter" => &["point", "constant", "area", "envmap", "spot", "directional"],
         "film" => &["hdrfilm"],
         "integrator" => {
             &["volpath", "volpathmis", "path", "direct", "prb", "prbvolpath", "prb_basic", "moment", "aov", "stokes"]
@@ -26,8 +39,11 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
         "phase" => &["isotropic", "hg"],
         "rfilter" => &["box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"],
         "sampler" => &["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
-        "sensor" => &["perspective"],
-        "shape" => &["obj", "cube", "rectangle"],
+        "sensor" => &["perspective", "thinlens"],
+        "shape" => {
+            &["obj", "ply", "serialized", "cube", "rectangle", "sphere", "disk", "cylinder", "shapegroup", "instance"]
+        }
+        "texture" => &["bitmap", "checkerboard"],
         _ => &[],
     }
 }
@@ -41,7 +57,7 @@ pub(super) fn unsupported(element: &Element, kind: &str, kinds: &[&str]) -> Scen
             help =
                 "it records a spectrum, and vdf renders red, green and blue: write <film type=\"hdrfilm\">".to_owned();
         }
-        ("texture" | "volume", _) => help = format!("write a value in place of the {tag}, as <rgb> or <float>"),
+        ("volume", _) => help = format!("write a value in place of the {tag}, as <rgb> or <float>"),
         _ => {}
     }
     at.error(format!("{tag} type \"{kind}\" is not supported"), help)
@@ -113,21 +129,12 @@ fn feature(element: &Element) -> Option<String> {
     let kind = element.attribute("type").map(|kind| kind.value.as_str());
     match (element.tag.as_str(), kind) {
         ("spectrum", Some(kind)) => Some(format!("spectrum {}", quoted(kind))),
-        ("spectrum", None) if element.attribute("filename").is_some() => Some("spectra in files".to_owned()),
-        ("spectrum", None) if is_over_wavelengths(element) => Some("spectra over wavelengths".to_owned()),
         ("rgb", _) if is_chromatic_extinction(element) => Some("chromatic sigma_t".to_owned()),
         (tag, Some(kind)) if element.is_object() && !kinds(tag).contains(&kind) => {
             Some(format!("{tag} {}", quoted(kind)))
         }
         _ => None,
     }
-}
-
-/// True for a `<spectrum>` of more than one number.
-fn is_over_wavelengths(element: &Element) -> bool {
-    element
-        .attribute("value")
-        .is_some_and(|v| v.value.trim().contains(|c: char| c == ':' || c == ',' || c.is_whitespace()))
 }
 
 fn is_chromatic_extinction(element: &Element) -> bool {
@@ -142,7 +149,6 @@ impl Feature<'_> {
         let colour = "write one number, or the colour as <rgb name=\"…\" value=\"red, green, blue\"/>";
         match (element.tag.as_str(), kind) {
             ("spectrum", Some(kind)) => kind.at.error(format!("{} is not supported", self.name), colour),
-            ("spectrum", None) => element.at.error(format!("{} are not supported", self.name), colour),
             ("rgb", _) => chromatic(element),
             (tag, kind) => unsupported(element, kind.map_or("", |kind| &kind.value), kinds(tag)),
         }

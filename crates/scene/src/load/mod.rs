@@ -7,6 +7,8 @@ mod features;
 mod film;
 mod integrator;
 mod lines;
+mod materials;
+mod metals;
 mod names;
 mod objects;
 mod parameters;
@@ -14,12 +16,14 @@ mod properties;
 mod reader;
 mod search;
 mod shapes;
+mod spectra;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod tests_hostile;
 #[cfg(test)]
 mod tests_mitsuba;
+mod textures;
 mod transform;
 mod xml;
 
@@ -56,7 +60,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] if a file cannot be read, or says what is wrong or not supported. So that a file from anywhere can be tried, only plain files
     /// are opened (no pipes, no devices), and there are limits: 64 MiB and a million elements of XML with all includes, 8 GiB of meshes, 2²⁸
-    /// triangles, 32 levels of elements, 15 of includes, 16 attributes an element. Polygons that are not convex may take 2²⁸ steps in each mesh,
+    /// triangles, 2²⁸ pixels of pictures, 32 levels of elements, 15 of includes, 16 attributes an element. Polygons that are not convex may take 2²⁸ steps in each mesh,
     /// about two seconds; more have to be cut into triangles beforehand.
     ///
     /// # Cost
@@ -77,6 +81,7 @@ impl Scene {
             search,
             ids: Ids::collect(&root)?,
             warnings: RefCell::default(),
+            pictures: RefCell::default(),
             mesh_bytes: 0,
             triangles: 0,
             media: Vec::new(),
@@ -98,6 +103,7 @@ struct Loader<'a> {
     search: Search,
     ids: Ids<'a>,
     warnings: RefCell<Vec<String>>,
+    pictures: RefCell<textures::Pictures>,
     /// Bytes of meshes that were read so far.
     mesh_bytes: u64,
     /// Triangles of mesh files so far.
@@ -130,23 +136,30 @@ impl<'a> Loader<'a> {
                 "shape" => shapes::read(&mut self, element)?,
                 "medium" => drop(objects::medium(&mut self, element)?),
                 // Read where they are used; here only checked, so that an unused one cannot hide a mistake.
-                "bsdf" => drop(objects::bsdf(&self, element)?),
+                "bsdf" => drop(materials::bsdf(&self, element)?),
+                "texture" => drop(textures::read(&self, element)?),
                 "phase" => drop(objects::phase(&self, element)?),
                 "emitter" => {
                     let Some(emitter) = objects::emitter(&self, element)? else { continue };
-                    if matches!(emitter, Emitter::Constant { .. }) {
-                        only_one(&mut constant, element, "constant emitter")?;
+                    if matches!(emitter, Emitter::Constant { .. } | Emitter::Envmap { .. }) {
+                        only_one(&mut constant, element, "environment emitter")?;
                     }
                     self.emitters.push(emitter);
                 }
                 "sensor" => sensors.push(element),
                 "integrator" => only_one(&mut integrator, element, "integrator")?,
                 "alias" => {}
+                "sampler" => {
+                    self.warn(
+                        &element.at,
+                        "a <sampler> directly inside <scene> has no effect: it belongs inside <sensor>",
+                    );
+                }
                 tag => {
                     let help = if OBJECT_TAGS.contains(&tag) {
                         "film and sampler belong inside <sensor>, rfilter inside <film>"
                     } else {
-                        "a property belongs inside an object; supported here: integrator, sensor, shape, emitter, medium, phase, bsdf, default, include, alias"
+                        "a property belongs inside an object; supported here: integrator, sensor, shape, emitter, medium, phase, bsdf, texture, default, include, alias"
                     };
                     return Err(element.at.error(format!("<{tag}> directly inside <scene>"), help));
                 }

@@ -1,9 +1,11 @@
-//! Media, BSDFs and emitters.
+//! Media and emitters.
+
+use glam::{DMat4, DVec3};
 
 use super::document::Element;
 use super::properties::Object;
-use super::{Loader, features};
-use crate::{Bsdf, Emitter, Medium, MediumId, Phase};
+use super::{Loader, features, textures};
+use crate::{Emitter, Medium, MediumId, Phase};
 use crate::{Rgb, SceneError};
 
 /// The medium's index; each is read once, however often it is referred to.
@@ -12,9 +14,10 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
         return Ok(id);
     }
     let mut object = Object::new(loader, element, features::kinds("medium"))?;
-    object.fixed("sample_emitters", true)?;
+    // How light is looked for, not what there is.
+    object.boolean("sample_emitters", true)?;
     object.boolean("has_spectral_extinction", true)?;
-    let albedo = object.reflectance("albedo", 0.75)?;
+    let albedo = object.reflectance(loader, "albedo", 0.75)?;
     let scale = object.float_where("scale", 1.0, |v| v >= 0.0, "at least 0")?;
     let sigma_t = object.grey("sigma_t", 1.0)?;
     if sigma_t < 0.0 || !(sigma_t * scale).is_finite() {
@@ -48,41 +51,6 @@ pub(super) fn phase<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Pha
     Ok(phase)
 }
 
-/// What a shape without a BSDF has.
-pub(super) fn default_bsdf(emits: bool) -> Bsdf {
-    Bsdf { front: Rgb::splat(if emits { 0.0 } else { 0.5 }), back: Rgb::ZERO }
-}
-
-/// A BSDF; `None` is `null`.
-pub(super) fn bsdf<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Bsdf>, SceneError> {
-    let mut object = Object::new(loader, element, features::kinds("bsdf"))?;
-    let bsdf = match object.kind() {
-        "diffuse" => Some(Bsdf { front: object.reflectance("reflectance", 0.5)?, back: Rgb::ZERO }),
-        "twosided" => {
-            let nested = object.nested("bsdf");
-            let (front, back) = match nested.as_slice() {
-                [both] => (both, both),
-                [front, back] => (front, back),
-                other => {
-                    return Err(object
-                        .error(format!("{} nested BSDFs", other.len()), "nest one diffuse, or two: front and back"));
-                }
-            };
-            Some(Bsdf { front: diffuse(loader, front.object)?, back: diffuse(loader, back.object)? })
-        }
-        _ => None,
-    };
-    object.finish()?;
-    Ok(bsdf)
-}
-
-fn diffuse<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneError> {
-    let mut object = Object::new(loader, element, &["diffuse"])?;
-    let reflectance = object.reflectance("reflectance", 0.5)?;
-    object.finish()?;
-    Ok(reflectance)
-}
-
 /// An emitter that stands by itself; `None` for an area light, which shines where a shape refers to it.
 pub(super) fn emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Option<Emitter>, SceneError> {
     let mut object = Object::new(loader, element, features::kinds("emitter"))?;
@@ -97,19 +65,79 @@ pub(super) fn emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<O
             }
             let to_world = object.world_transform(loader)?;
             let position = object.point("position")?.unwrap_or_else(|| to_world.w_axis.truncate());
-            Emitter::Point { position, intensity: object.emission("intensity")? }
+            Emitter::Point { position, intensity: object.emission(loader, "intensity")? }
         }
-        _ => Emitter::Constant { radiance: object.emission("radiance")? },
+        "spot" => spot(loader, &mut object)?,
+        "directional" => directional(loader, &mut object)?,
+        "envmap" => envmap(loader, &mut object)?,
+        _ => Emitter::Constant { radiance: object.emission(loader, "radiance")? },
     };
     sampling_weight(&mut object)?;
     object.finish()?;
     Ok(Some(emitter))
 }
 
+fn spot<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, SceneError> {
+    let to_world = object.world_transform(loader)?;
+    let intensity = object.emission(loader, "intensity")?;
+    let in_range = |angle: f64| angle > 0.0 && angle <= 180.0;
+    let cutoff = object.float_where("cutoff_angle", 20.0, in_range, "more than 0 and at most 180 degrees")?;
+    let beam =
+        object.float_where("beam_width", cutoff * 0.75, |b| b >= 0.0 && b <= cutoff, "from 0 to cutoff_angle")?;
+    if object.texture_element("texture")?.is_some() {
+        return Err(object.error("a spot with a texture is not supported", "remove the texture"));
+    }
+    Ok(Emitter::Spot {
+        position: to_world.w_axis.truncate(),
+        direction: to_world.z_axis.truncate().normalize(),
+        intensity,
+        beam: beam.to_radians(),
+        cutoff: cutoff.to_radians(),
+    })
+}
+
+fn directional<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, SceneError> {
+    if object.has("direction") && object.has("to_world") {
+        return Err(object.place_of("to_world").error("both \"direction\" and \"to_world\"", "remove one"));
+    }
+    let to_world = object.world_transform(loader)?;
+    let direction = object.vector("direction")?.unwrap_or_else(|| to_world.z_axis.truncate());
+    let Some(direction) = direction.try_normalize() else {
+        return Err(object.place_of("direction").error("the direction is zero", "write a vector"));
+    };
+    Ok(Emitter::Directional { direction, irradiance: object.emission(loader, "irradiance")? })
+}
+
+fn envmap<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, SceneError> {
+    let world_from_map = object.world_transform(loader)?;
+    let scale = object.float_where("scale", 1.0, |v| v >= 0.0 && v <= f64::from(f32::MAX), "at least 0")? as f32;
+    // How directions are drawn, not what is drawn.
+    object.boolean("mis_compensation", false)?;
+    let name =
+        object.string("filename")?.ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
+    let image = textures::pixels(loader, name, object.place_of("filename"), false)?;
+    if image.width < 2 || image.height < 2 {
+        return Err(object.error("the picture has less than 2 × 2 pixels", ""));
+    }
+    // Directions are all that it turns: what else it does has no meaning at infinity.
+    let axes = [world_from_map.x_axis, world_from_map.y_axis, world_from_map.z_axis].map(|a| a.truncate());
+    let size = axes[0].length();
+    let is_rotation = axes.iter().all(|a| (a.length() / size - 1.0).abs() < 1e-3)
+        && axes[0].dot(axes[1]).abs() + axes[1].dot(axes[2]).abs() + axes[2].dot(axes[0]).abs() < 1e-3 * size * size;
+    if !is_rotation {
+        return Err(object.place_of("to_world").error("to_world of the envmap distorts it", "only rotate it"));
+    }
+    let z = axes[2].normalize();
+    let x = (axes[0] - z * axes[0].dot(z)).normalize();
+    let y = z.cross(x) * axes[0].cross(axes[1]).dot(axes[2]).signum();
+    let world_from_map = DMat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), DVec3::ZERO.extend(1.0));
+    Ok(Emitter::Envmap { image, scale, world_from_map })
+}
+
 /// The radiance of an area light.
 pub(super) fn area_emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneError> {
     let mut object = Object::new(loader, element, &["area"])?;
-    let radiance = object.emission("radiance")?;
+    let radiance = object.emission(loader, "radiance")?;
     sampling_weight(&mut object)?;
     object.finish()?;
     Ok(radiance)

@@ -1,13 +1,15 @@
 //! Typed reading of an object's properties and nested objects. What nobody asked for is an error, as in Mitsuba.
 
 use std::collections::HashSet;
+use std::io::Read as _;
 
 use glam::{DMat4, DVec3};
 
 use super::Loader;
 use super::document::{Element, Place};
-use super::{features, names, transform};
-use crate::{Rgb, SceneError};
+use super::spectra::{self, Weighed};
+use super::{features, names, textures, transform};
+use crate::{Rgb, SceneError, Texture};
 
 /// The colour of the spectrum that is 1 at each wavelength, with the primaries of sRGB and its white, D65; as Mitsuba 3.9.1 has it.
 const EQUAL_ENERGY: DVec3 = DVec3::new(1.204_793_93, 0.948_291, 0.908_916_06);
@@ -173,15 +175,6 @@ impl<'a> Object<'a> {
         })
     }
 
-    /// A boolean that Mitsuba has and of which only `only` is supported.
-    pub(super) fn fixed(&mut self, name: &'static str, only: bool) -> Result<(), SceneError> {
-        if self.boolean(name, only)? == only {
-            return Ok(());
-        }
-        let message = format!("\"{name}\" = {} is not supported", !only);
-        Err(self.place_of(name).error(message, format!("only {only} is; leave it out")))
-    }
-
     /// Properties of Mitsuba's that change nothing here; a warning says so.
     pub(super) fn without_effect(&mut self, loader: &Loader<'_>, names: &[&'static str]) -> Result<(), SceneError> {
         for name in names {
@@ -192,47 +185,133 @@ impl<'a> Object<'a> {
         Ok(())
     }
 
-    /// A reflectance or albedo, each channel in [0, 1]; `<float>` and `<spectrum>` make a grey.
-    pub(super) fn reflectance(&mut self, name: &'static str, default: f32) -> Result<Rgb, SceneError> {
-        self.colour(name, default, 1.0, DVec3::ONE)
+    /// A reflectance or albedo, each channel in [0, 1]; `<float>` and a `<spectrum>` of one number make a grey.
+    pub(super) fn reflectance(
+        &mut self,
+        loader: &Loader<'_>,
+        name: &'static str,
+        default: f32,
+    ) -> Result<Rgb, SceneError> {
+        self.colour(loader, name, default, Some(1.0), Weighed::ByDaylight)
     }
 
-    /// What an emitter emits. `<float>` makes a grey. A `<spectrum>` is as bright at each wavelength, which is not white:
+    /// A colour whose channels are at least 0, as an index of refraction.
+    pub(super) fn unbounded(&mut self, loader: &Loader<'_>, name: &'static str) -> Result<Rgb, SceneError> {
+        self.colour(loader, name, 0.0, None, Weighed::ByDaylight)
+    }
+
+    /// What an emitter emits. `<float>` makes a grey. A `<spectrum>` of one number is as bright at each wavelength, which is not white:
     /// white is daylight, which is weaker in red.
-    pub(super) fn emission(&mut self, name: &'static str) -> Result<Rgb, SceneError> {
-        self.colour(name, 1.0, f64::from(f32::MAX), EQUAL_ENERGY)
+    pub(super) fn emission(&mut self, loader: &Loader<'_>, name: &'static str) -> Result<Rgb, SceneError> {
+        self.colour(loader, name, 1.0, None, Weighed::Equally)
     }
 
-    fn colour(&mut self, name: &'static str, default: f32, most: f64, spectrum: DVec3) -> Result<Rgb, SceneError> {
-        let Some(element) = self.property(name, &["rgb", "float", "spectrum"])? else { return Ok(Rgb::splat(default)) };
+    fn colour(
+        &mut self,
+        loader: &Loader<'_>,
+        name: &'static str,
+        default: f32,
+        most: Option<f64>,
+        weighed: Weighed,
+    ) -> Result<Rgb, SceneError> {
+        let Some(element) = self.property(name, &["rgb", "float", "integer", "spectrum"])? else {
+            return Ok(Rgb::splat(default));
+        };
         let values = match element.tag.as_str() {
             "rgb" => rgb(element)?,
-            "spectrum" => constant_spectrum(element)? * spectrum,
+            "spectrum" => spectrum(loader, element, weighed)?,
             _ => DVec3::splat(number(element)?),
         };
-        if values.cmpge(DVec3::ZERO).all() && values.cmple(DVec3::splat(most)).all() {
+        // A spectrum over wavelengths may be so pure that there is less than nothing of a primary; Mitsuba cuts that off, too.
+        let values = if element.tag == "spectrum" && !is_flat(element) {
+            values.max(DVec3::ZERO).min(most.map_or(DVec3::INFINITY, DVec3::splat))
+        } else {
+            values
+        };
+        let limit = most.unwrap_or(f64::from(f32::MAX));
+        if values.cmpge(DVec3::ZERO).all() && values.cmple(DVec3::splat(limit)).all() {
             return Ok(values.as_vec3());
         }
-        let range = if most == 1.0 { "in [0, 1]" } else { "at least 0 and fit into single precision" };
+        let range = if most.is_some() { "in [0, 1]" } else { "at least 0 and fit into single precision" };
         Err(element.at.error(
             format!("\"{name}\" is {}, {}, {}", values.x, values.y, values.z),
             format!("each channel must be {range}"),
         ))
     }
 
+    /// A colour in [0, 1] over a surface: a texture, or what [`Object::reflectance`] reads.
+    pub(super) fn texture(
+        &mut self,
+        loader: &Loader<'a>,
+        name: &'static str,
+        default: f32,
+    ) -> Result<Texture, SceneError> {
+        match self.texture_element(name)? {
+            Some(nested) => textures::read(loader, nested),
+            None => self.reflectance(loader, name, default).map(Texture::Constant),
+        }
+    }
+
+    /// As [`Object::texture`], but positive: a `<float>` of 0 is an error.
+    pub(super) fn positive_texture(
+        &mut self,
+        loader: &Loader<'a>,
+        name: &'static str,
+        default: f32,
+    ) -> Result<Texture, SceneError> {
+        let texture = self.texture(loader, name, default)?;
+        if texture.constant().is_some_and(|c| c.min_element() <= 0.0) {
+            return Err(self.place_of(name).error(format!("\"{name}\" is 0"), "it must be positive and at most 1"));
+        }
+        Ok(texture)
+    }
+
+    /// The texture of that name, nested or referred to.
+    pub(super) fn texture_element(&mut self, name: &'static str) -> Result<Option<&'a Element>, SceneError> {
+        self.asked_properties.push(name);
+        let mut found = None;
+        for (child, target, used) in &mut self.children {
+            let Some(object) = target.filter(|t| t.tag == "texture") else { continue };
+            if child.attribute("name").is_some_and(|a| a.value == name) {
+                *used = true;
+                if found.replace(object).is_some() {
+                    return Err(child.at.error(format!("a second texture \"{name}\""), "remove one of them"));
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// True if there is a property, or a texture, of that name.
+    pub(super) fn has_any(&self, name: &str) -> bool {
+        self.children.iter().any(|(c, ..)| c.attribute("name").is_some_and(|a| a.value == name))
+    }
+
+    /// True if the property is there as a string.
+    pub(super) fn is_string(&self, name: &str) -> bool {
+        self.children.iter().any(|(c, ..)| c.tag == "string" && c.attribute("name").is_some_and(|a| a.value == name))
+    }
+
+    /// A transform that is not read yet.
+    pub(super) fn transform_element(&mut self, name: &'static str) -> Result<Option<&'a Element>, SceneError> {
+        self.property(name, &["transform"])
+    }
+
     /// A number, or a colour whose channels are equal.
     pub(super) fn grey(&mut self, name: &'static str, default: f64) -> Result<f64, SceneError> {
         let Some(element) = self.property(name, &["float", "rgb", "spectrum"])? else { return Ok(default) };
-        match element.tag.as_str() {
+        let value = match element.tag.as_str() {
             "float" => return number(element),
-            "spectrum" => return constant_spectrum(element),
-            _ => {}
-        }
-        let value = rgb(element)?;
+            "spectrum" if element.attribute("filename").is_none() => {
+                DVec3::splat(transform::parse(element.require("value")?, &element.at)?)
+            }
+            "spectrum" => return Err(element.at.error(format!("\"{name}\" from a file"), "write one number")),
+            _ => rgb(element)?,
+        };
         if value.x != value.y || value.y != value.z {
             return Err(features::chromatic(element));
         }
-        if value.x > 1.0 {
+        if value.x > 1.0 && element.tag == "rgb" {
             return Err(element.at.error(
                 format!("\"{name}\" as <rgb> is {}, more than 1", value.x),
                 format!("Mitsuba refuses that: write <float name=\"{name}\" …>, or use \"scale\""),
@@ -243,7 +322,16 @@ impl<'a> Object<'a> {
 
     /// A point.
     pub(super) fn point(&mut self, name: &'static str) -> Result<Option<DVec3>, SceneError> {
-        let Some(element) = self.property(name, &["point"])? else { return Ok(None) };
+        self.three(name, &["point"])
+    }
+
+    /// A vector.
+    pub(super) fn vector(&mut self, name: &'static str) -> Result<Option<DVec3>, SceneError> {
+        self.three(name, &["vector"])
+    }
+
+    fn three(&mut self, name: &'static str, tags: &[&str]) -> Result<Option<DVec3>, SceneError> {
+        let Some(element) = self.property(name, tags)? else { return Ok(None) };
         if element.attribute("value").is_some() {
             return transform::numbers(element, "value").and_then(|v| one_or_three(element, &v)).map(Some);
         }
@@ -304,9 +392,54 @@ fn number(element: &Element) -> Result<f64, SceneError> {
     transform::parse(element.require("value")?, &element.at)
 }
 
-/// A spectrum that is the same at each wavelength; there are no others after the check of features.
-fn constant_spectrum(element: &Element) -> Result<f64, SceneError> {
-    transform::parse(element.require("value")?, &element.at)
+/// A spectrum as a colour: one number, the same at each wavelength; a list of wavelengths with values; or such a list in a file.
+fn spectrum(loader: &Loader<'_>, element: &Element, weighed: Weighed) -> Result<DVec3, SceneError> {
+    let text = match element.attribute("filename") {
+        None => element.require("value")?.to_owned(),
+        Some(file) => spectrum_file(loader, &file.value, element)?,
+    };
+    if is_flat(element) {
+        let value = transform::parse(&text, &element.at)?;
+        return Ok(match weighed {
+            Weighed::ByDaylight => DVec3::splat(value),
+            Weighed::Equally => EQUAL_ENERGY * value,
+        });
+    }
+    let mut pairs: Vec<(f64, f64)> = Vec::new();
+    for pair in text.split(|c: char| c == ',' || c.is_whitespace()).filter(|p| !p.is_empty()) {
+        let Some((wavelength, value)) = pair.split_once(':') else {
+            let help = "write wavelengths in nm with values, as in 400:0.2, 700:0.8";
+            return Err(element.at.error(format!("\"{pair}\" in a spectrum"), help));
+        };
+        let (wavelength, value) = (transform::parse(wavelength, &element.at)?, transform::parse(value, &element.at)?);
+        if pairs.last().is_some_and(|&(last, _)| last >= wavelength) {
+            return Err(element.at.error("the wavelengths of a spectrum do not grow", "sort them"));
+        }
+        pairs.push((wavelength, value));
+    }
+    Ok(spectra::colour(&pairs, weighed))
+}
+
+/// True for a spectrum of one number.
+fn is_flat(element: &Element) -> bool {
+    let is_separator = |c: char| c == ':' || c == ',' || c.is_whitespace();
+    element.attribute("value").is_some_and(|v| !v.value.trim().contains(is_separator))
+}
+
+/// The lines of a file with a wavelength and a value in each, as pairs with a colon.
+fn spectrum_file(loader: &Loader<'_>, name: &str, element: &Element) -> Result<String, SceneError> {
+    const MOST: u64 = 1 << 20;
+    let path = loader.search.mesh(loader.source, name);
+    let unreadable = |e: std::io::Error| {
+        let help = "the path is relative to the folder of the scene file, or to a folder of a <path>";
+        element.at.error(format!("cannot read \"{}\": {e}", path.display()), help)
+    };
+    let (input, _) = loader.source.open(&path, MOST).map_err(unreadable)?;
+    let mut text = String::new();
+    std::io::Read::take(input, MOST).read_to_string(&mut text).map_err(unreadable)?;
+    let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim()).filter(|l| !l.is_empty());
+    let pairs: Vec<String> = lines.map(|line| line.split_whitespace().collect::<Vec<_>>().join(":")).collect();
+    Ok(format!("{},", pairs.join(",")))
 }
 
 fn parse_integer(element: &Element) -> Result<i64, SceneError> {

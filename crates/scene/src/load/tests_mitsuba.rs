@@ -4,7 +4,9 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::LoadOptions;
 use super::tests::{FILM, FOG, HEAD, LIGHT, file, load, load_with, refused, refused_text, with_sensor};
-use crate::{ComponentFormat, Emitter, IntegratorSettings, ReconstructionFilter, Scene, SceneSource};
+use crate::{
+    Bsdf, ComponentFormat, Emitter, IntegratorSettings, Microfacets, ReconstructionFilter, Scene, SceneSource, Texture,
+};
 
 fn warned(scene: &Scene, part: &str) -> bool {
     scene.warnings.iter().any(|w| w.contains(part))
@@ -107,18 +109,21 @@ fn spectra_that_are_constant_are_read() {
         named("radiance"),
         named("albedo")
     ));
-    assert_eq!(loaded.surfaces[0].bsdf.front, Vec3::splat(0.5));
+    assert_eq!(loaded.surfaces[0].bsdf, Bsdf::lambertian(Vec3::splat(0.5), Vec3::ZERO));
     assert_eq!((loaded.media[0].sigma_t, loaded.media[0].albedo), (3.0, Vec3::splat(0.5)));
     // Equal energy is not white: seen in Mitsuba 3.9.1.
-    let Emitter::Constant { radiance } = loaded.emitters[0] else { panic!("not constant") };
+    let Emitter::Constant { radiance } = loaded.emitters[0].clone() else { panic!("not constant") };
     assert!((radiance - Vec3::new(0.602_397, 0.474_146, 0.454_458)).abs().max_element() < 1e-6, "{radiance}");
-    refused(
-        "<bsdf type='diffuse'><spectrum name='reflectance' value='400:.1, 700:.2'/></bsdf>",
-        "3:22",
-        "over wavelengths",
-    );
-    refused("<bsdf type='diffuse'><spectrum name='reflectance' value='.1 .1 .1'/></bsdf>", "3:22", "over wavelengths");
-    refused("<bsdf type='diffuse'><spectrum name='reflectance' value='1.5'/></bsdf>", "3:22", "[0, 1]");
+    let over = |value: &str| {
+        format!("<shape type='cube'><bsdf type='diffuse'><spectrum name='reflectance' value='{value}'/></bsdf></shape>")
+    };
+    let Bsdf::Lambertian { front, .. } = load(&over("360:0.5, 830:0.5")).surfaces[0].bsdf.clone() else {
+        panic!("plain")
+    };
+    assert!((front - 0.5).abs().max_element() < 1e-3, "{front}");
+    refused(&over("500:0.5, 400:0.2"), "3:41", "do not grow");
+    refused(&over("0.1, 0.2"), "3:41", "400:0.2");
+    refused(&over("1.5"), "3:41", "[0, 1]");
 }
 
 #[test]
@@ -128,7 +133,7 @@ fn rotations_are_those_of_mitsuba() {
             "<emitter type='point'><transform name='to_world'><translate x='1' y='2' z='3'/>{op}</transform></emitter>"
         );
         let loaded = load(&text);
-        let Emitter::Point { position, .. } = loaded.emitters[0] else { panic!("not a point") };
+        let Emitter::Point { position, .. } = loaded.emitters[0].clone() else { panic!("not a point") };
         (position, warned(&loaded, "rotation axis has length"))
     };
     let near = |(position, warning): (DVec3, bool), expected: DVec3, warns: bool| {
@@ -223,34 +228,36 @@ fn area_lights_may_be_referred_to() {
 #[test]
 fn an_area_light_with_a_null_bsdf_is_a_black_one() {
     let loaded = load("<shape type='rectangle'><bsdf type='null'/><emitter type='area'/></shape>");
-    assert_eq!((loaded.surfaces[0].bsdf.front, loaded.surfaces[0].bsdf.back), (Vec3::ZERO, Vec3::ZERO));
+    assert_eq!(loaded.surfaces[0].bsdf, Bsdf::default());
     assert_eq!(loaded.emitters[0], Emitter::Area { surface: 0 });
     assert!(warned(&loaded, "opaque and black") && loaded.boundaries.is_empty());
 }
 
 #[test]
 fn all_features_that_a_scene_lacks_are_named_at_once() {
-    let body = "<emitter type='envmap'><string name='filename' value='a.exr'/></emitter>\n\
-         <shape type='ply'><string name='filename' value='none.ply'/><bsdf type='twosided'><bsdf type='plastic'>\
-         <texture type='bitmap' name='diffuse_reflectance'/></bsdf></bsdf></shape>\n\
-         <shape type='ply'><string name='filename' value='none.ply'/></shape>\n\
-         <bsdf type='diffuse' id='a'><spectrum name='reflectance' value='400:1, 700:2'/></bsdf>\n\
+    let body = "<emitter type='projector'><string name='filename' value='a.exr'/></emitter>\n\
+         <shape type='hair'><string name='filename' value='none.hair'/><bsdf type='twosided'><bsdf type='principled'>\
+         <texture type='wood' name='diffuse_reflectance'/></bsdf></bsdf></shape>\n\
+         <shape type='hair'><string name='filename' value='none.hair'/></shape>\n\
          <bsdf type='diffuse' id='b'><spectrum name='reflectance' type='d65'><float name='scale' value='1'/></spectrum></bsdf>\n\
-         <bsdf type='diffuse' id='c'><spectrum name='reflectance' filename='a.spd'/></bsdf>\n\
          <medium type='homogeneous'><rgb name='sigma_t' value='1 2 3'/></medium>";
-    let list = "8 features of this scene are not supported: emitter \"envmap\" (s.xml:3), shape \"ply\" (s.xml:4 and 1 more), \
-                bsdf \"plastic\" (s.xml:4), texture \"bitmap\" (s.xml:4), spectra over wavelengths (s.xml:6), \
-                spectrum \"d65\" (s.xml:7), spectra in files (s.xml:8), chromatic sigma_t (s.xml:9)\n";
+    let list = "6 features of this scene are not supported: emitter \"projector\" (s.xml:3), shape \"hair\" (s.xml:4 and 1 more), \
+                bsdf \"principled\" (s.xml:4), texture \"wood\" (s.xml:4), \
+                spectrum \"d65\" (s.xml:6), chromatic sigma_t (s.xml:7)\n";
     refused(body, "3:1", list);
-    refused(body, "3:1", "supported: bsdf diffuse, twosided, null; emitter point, constant, area; shape obj");
+    refused(
+        body,
+        "3:1",
+        "twosided, mask, blendbsdf, null; emitter point, constant, area, envmap, spot, directional; shape obj",
+    );
     // One alone has its own message, before any file is looked for.
-    let ply = "<shape type='obj'><string name='filename' value='none.obj'/></shape><shape type='ply'/>";
-    refused(ply, "3:76", "shape type \"ply\" is not supported\n  help: supported: obj");
+    let hair = "<shape type='obj'><string name='filename' value='none.obj'/></shape><shape type='hair'/>";
+    refused(hair, "3:76", "shape type \"hair\" is not supported\n  help: supported: obj");
     refused("<bsdf type='diffuse'><spectrum name='reflectance' type='d65'/></bsdf>", "3:51", "spectrum \"d65\" is not");
     // A camera that is not used needs nothing.
-    let cameras = format!("{LIGHT}<sensor type='thinlens'/><sensor type='perspective'>{FILM}</sensor></scene>");
+    let cameras = format!("{LIGHT}<sensor type='irradiancemeter'/><sensor type='perspective'>{FILM}</sensor></scene>");
     let text = format!("{HEAD}{cameras}");
-    refused_text(&text, &[], "s.xml:3:32", "sensor type \"thinlens\"");
+    refused_text(&text, &[], "s.xml:3:32", "sensor type \"irradiancemeter\"");
     let options = LoadOptions { sensor: Some(1), ..LoadOptions::default() };
     assert!(Scene::from_source(&SceneSource::embedded(file("s.xml", &text), vec![]), &options).is_ok());
 }
@@ -259,4 +266,77 @@ fn all_features_that_a_scene_lacks_are_named_at_once() {
 fn emitters_that_should_be_hidden_are_seen_and_a_warning_says_so() {
     let text = with_integrator("<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>", "");
     assert!(warned(&load_with(&text, &[], &[]).unwrap(), "\"hide_emitters\" has no effect"));
+}
+
+/// A group is nothing by itself; each instance moves all that is in it, after its own transform.
+#[test]
+fn instances_move_the_shapes_of_their_group() {
+    let moved = |axis: &str| format!("<transform name='to_world'><translate {axis}='3'/></transform>");
+    let group = format!(
+        "<shape type='shapegroup' id='g'><shape type='rectangle'>{}</shape><shape type='sphere'/></shape>",
+        moved("x")
+    );
+    assert!(load(&group).surfaces.is_empty());
+    let loaded = load(&format!("{group}<shape type='instance'><ref id='g'/>{}</shape>", moved("y")));
+    assert_eq!(loaded.surfaces.len(), 2);
+    assert_eq!(loaded.surfaces[0].triangles[0].vertices[0], Vec3::new(2.0, 2.0, 0.0));
+    assert_eq!(loaded.surfaces[1].curved.map(|c| c.placement().1), Some(DVec3::Y * 3.0));
+    refused("<shape type='instance'/>", "3:1", "no shapegroup");
+    let nested = format!(
+        "{group}<shape type='shapegroup' id='h'><ref id='g'/></shape><shape type='instance'><ref id='h'/></shape>"
+    );
+    refused(&nested, "3:1", "do not nest");
+}
+
+/// Curved shapes stay what they are, with Mitsuba's parameters; what they cannot be is refused.
+#[test]
+fn curved_shapes_are_placed_and_never_tessellated() {
+    let loaded = load(
+        "<shape type='sphere'><point name='center' x='1' y='2' z='3'/><float name='radius' value='0.5'/></shape>\
+         <shape type='disk'/><shape type='cylinder'><point name='p1' value='0 0 4'/><float name='radius' value='2'/></shape>",
+    );
+    assert!(loaded.surfaces.iter().all(|s| s.triangles.is_empty()));
+    let shape = |i: usize| loaded.surfaces[i].curved.expect("curved");
+    assert_eq!(shape(0).to_world(DVec3::X), DVec3::new(1.5, 2.0, 3.0));
+    assert_eq!(shape(1).normal(DVec3::ZERO), DVec3::Z);
+    assert!((shape(2).to_world(DVec3::new(0.0, 1.0, 0.5)) - DVec3::new(0.0, 2.0, 2.0)).length() < 1e-12);
+    let scaled = "<transform name='to_world'><scale x='2'/></transform>";
+    refused(&format!("<shape type='sphere'>{scaled}</shape>"), "3:1", "an ellipsoid");
+    refused(&format!("<shape type='cylinder'>{scaled}</shape>"), "3:1", "not round");
+    refused("<shape type='sphere'><float name='radius' value='0'/></shape>", "3:22", "positive");
+    refused("<shape type='cylinder'><point name='p1' value='0 0 0'/></shape>", "3:1", "one point");
+    let fog = format!("{FOG}<shape type='disk'><bsdf type='null'/><ref id='fog' name='interior'/></shape>");
+    refused(&fog, "3:", "rims");
+    let ball = load(
+        &format!("{FOG}<shape type='sphere'><bsdf type='dielectric'/><ref id='fog' name='interior'/></shape>")
+            .replace("{}", ""),
+    );
+    assert_eq!((ball.surfaces.len(), ball.boundaries.len()), (1, 1));
+}
+
+/// What of a scene's materials has a default, and what is refused.
+#[test]
+fn materials_have_mitsubas_defaults() {
+    let bsdf = |text: &str| load(&format!("<shape type='cube'>{text}</shape>")).surfaces[0].bsdf.clone();
+    let Bsdf::Dielectric { eta, .. } = bsdf("<bsdf type='dielectric'/>") else { panic!("glass") };
+    assert!((eta - 1.5046 / 1.000_277).abs() < 1e-12);
+    let Bsdf::Plastic { eta, nonlinear: false, roughness: Some(rough), .. } = bsdf("<bsdf type='roughplastic'/>")
+    else {
+        panic!("plastic")
+    };
+    assert!((eta - 1.49 / 1.000_277).abs() < 1e-12);
+    assert_eq!((rough.distribution, rough.alpha_u), (Microfacets::Beckmann, Texture::grey(0.1)));
+    let mirror = Bsdf::Conductor { eta: Vec3::ZERO, k: Vec3::ONE, specular: Texture::grey(1.0), roughness: None };
+    assert_eq!(bsdf("<bsdf type='conductor'/>"), mirror);
+    assert_eq!(bsdf("<bsdf type='conductor'><string name='material' value='none'/></bsdf>"), mirror);
+    let twosided = "<bsdf type='twosided'><bsdf type='diffuse'/></bsdf>";
+    assert_eq!(bsdf(twosided), Bsdf::lambertian(Vec3::splat(0.5), Vec3::splat(0.5)));
+    let material = |name: &str| format!("<bsdf type='conductor'><string name='material' value='{name}'/></bsdf>");
+    assert!(matches!(bsdf(&material("Cu")), Bsdf::Conductor { eta, .. } if eta.y > 0.9));
+    refused(&material("Cooper"), "3:24", "\"Cooper\" is not a metal");
+    refused("<bsdf type='dielectric'><string name='int_ior' value='watre'/></bsdf>", "3:25", "did you mean \"water\"");
+    refused("<bsdf type='twosided'><bsdf type='dielectric'/></bsdf>", "3:23", "transmits light");
+    refused("<bsdf type='roughconductor'><float name='alpha' value='0'/></bsdf>", "3:29", "is 0");
+    refused("<bsdf type='mask'/>", "3:1", "must hold one BSDF");
+    refused("<bsdf type='blendbsdf'><bsdf type='diffuse'/></bsdf>", "3:1", "must hold two");
 }

@@ -24,6 +24,11 @@ pub(super) fn numbers(element: &Element, name: &str) -> Result<Vec<f64>, SceneEr
         .collect()
 }
 
+/// True for a `<transform>` of one matrix of nine numbers.
+pub(super) fn is_three_by_three(element: &Element) -> bool {
+    matches!(&element.children[..], [matrix] if matrix.tag == "matrix" && numbers(matrix, "value").is_ok_and(|m| m.len() == 9))
+}
+
 /// The matrix of a `<transform>`.
 pub(super) fn read(loader: &Loader<'_>, element: &Element) -> Result<DMat4, SceneError> {
     let mut total = DMat4::IDENTITY;

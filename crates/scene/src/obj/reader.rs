@@ -2,10 +2,10 @@
 
 use std::io::BufRead;
 
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 
 use super::polygon::{Triangulator, Work};
-use super::{Mesh, MeshError};
+use crate::mesh::{Mesh, MeshError, NO_INDEX};
 use crate::text::quoted;
 
 /// Statements without an effect on the surfaces.
@@ -53,9 +53,7 @@ pub(crate) fn read(input: &mut dyn BufRead, limits: &Limits) -> Result<Mesh, Mes
         limits,
         mesh: Mesh::default(),
         faces: Vec::new(),
-        corners: Vec::new(),
-        texture_coordinates: 0,
-        normals: 0,
+        corners: [const { Vec::new() }; 3],
         farthest: [const { None }; 3],
         unknown: Vec::new(),
         line: 0,
@@ -138,9 +136,8 @@ struct Reader<'a> {
     limits: &'a Limits,
     mesh: Mesh,
     faces: Vec<Face>,
-    corners: Vec<u32>,
-    texture_coordinates: u64,
-    normals: u64,
+    /// The numbers of the corners' vertices; those of their texture coordinates and normals, as many or, if no face has any, none.
+    corners: [Vec<u32>; 3],
     /// A face may name a vertex that comes later. The largest such number of a vertex, texture coordinate and normal, with the error
     /// if it never comes.
     farthest: [Option<(u64, MeshError)>; 3],
@@ -160,14 +157,8 @@ impl Reader<'_> {
         match keyword {
             b"v" => self.vertex(statement, words),
             b"f" => self.face(statement, words),
-            b"vt" => {
-                self.texture_coordinates += 1;
-                Ok(())
-            }
-            b"vn" => {
-                self.normals += 1;
-                Ok(())
-            }
+            b"vt" => self.texture_coordinates(statement, words),
+            b"vn" => self.normal(statement, words),
             _ if WITHOUT_EFFECT.contains(&keyword) => Ok(()),
             _ => {
                 self.warn_unknown(keyword);
@@ -200,15 +191,62 @@ impl Reader<'_> {
             let message = if count > 7 { "too many numbers".to_owned() } else { format!("{count} numbers") };
             return Err(self.error(statement, &message, "a vertex has x, y and z, and may have a weight or a colour"));
         }
-        if self.mesh.positions.len() >= self.limits.triangles {
-            return Err(self.error(
-                statement,
-                "too many vertices",
-                format!("at most {} are read", self.limits.triangles),
-            ));
-        }
+        self.has_room(statement, self.mesh.positions.len())?;
         self.mesh.positions.push(DVec3::new(numbers[0], numbers[1], numbers[2]));
         Ok(())
+    }
+
+    fn texture_coordinates<'w>(
+        &mut self,
+        statement: &[u8],
+        words: impl Iterator<Item = &'w [u8]>,
+    ) -> Result<(), MeshError> {
+        let mut uv = Vec2::ZERO;
+        let mut count = 0;
+        for word in words {
+            let number = self.number(statement, word)?;
+            if count < 2 {
+                uv[count] = number as f32;
+            }
+            count += 1;
+        }
+        if !(1..=3).contains(&count) || !uv.is_finite() {
+            let message = format!("{count} numbers");
+            return Err(self.error(
+                statement,
+                &message,
+                "texture coordinates are u, v and maybe w, in single precision",
+            ));
+        }
+        self.has_room(statement, self.mesh.uvs.len())?;
+        self.mesh.uvs.push(uv);
+        Ok(())
+    }
+
+    fn normal<'w>(&mut self, statement: &[u8], words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
+        let mut normal = DVec3::ZERO;
+        let mut count = 0;
+        for word in words {
+            let number = self.number(statement, word)?;
+            if count < 3 {
+                normal[count] = number;
+            }
+            count += 1;
+        }
+        if count != 3 {
+            return Err(self.error(statement, &format!("{count} numbers"), "a normal has x, y and z"));
+        }
+        self.has_room(statement, self.mesh.normals.len())?;
+        self.mesh.normals.push(normal);
+        Ok(())
+    }
+
+    /// An error if there are already as many as may be.
+    fn has_room(&self, statement: &[u8], count: usize) -> Result<(), MeshError> {
+        if count < self.limits.triangles {
+            return Ok(());
+        }
+        Err(self.error(statement, "too many vertices", format!("at most {} are read", self.limits.triangles)))
     }
 
     fn number(&self, statement: &[u8], word: &[u8]) -> Result<f64, MeshError> {
@@ -229,28 +267,33 @@ impl Reader<'_> {
     }
 
     fn face<'w>(&mut self, statement: &[u8], words: impl Iterator<Item = &'w [u8]>) -> Result<(), MeshError> {
-        let start = self.corners.len();
+        let start = self.corners[0].len();
         for word in words {
             let mut parts = word.split(|&b| b == b'/');
-            let counts = [self.mesh.positions.len() as u64, self.texture_coordinates, self.normals];
-            let mut position = None;
+            let counts = self.counts();
+            let mut corner = [None; 3];
             for (kind, count) in counts.into_iter().enumerate() {
                 let Some(part) = parts.next().filter(|p| !p.is_empty()) else { continue };
-                let number = self.index(statement, part, kind, count)?;
-                if kind == 0 {
-                    position = Some(number);
-                }
+                corner[kind] = Some(self.index(statement, part, kind, count)?);
             }
-            let position = position.filter(|_| parts.next().is_none()).ok_or_else(|| {
+            let position = corner[0].filter(|_| parts.next().is_none()).ok_or_else(|| {
                 let word = quoted(&String::from_utf8_lossy(word));
                 let message = format!("{word} is not a corner of a face");
                 self.error(statement, &message, "write the number of a vertex, as in 3, 3/1, 3//2 or 3/1/2")
             })?;
-            self.corners.push(position);
+            let [positions, attributes @ ..] = &mut self.corners;
+            for (list, index) in attributes.iter_mut().zip(&corner[1..]) {
+                // Most meshes without texture coordinates have them nowhere.
+                if index.is_some() || !list.is_empty() {
+                    list.resize(positions.len(), NO_INDEX);
+                    list.push(index.unwrap_or(NO_INDEX));
+                }
+            }
+            positions.push(position);
         }
-        let corners = self.corners.len() - start;
+        let corners = self.corners[0].len() - start;
         if corners < 3 {
-            self.corners.truncate(start);
+            self.corners.iter_mut().for_each(|list| list.truncate(start));
             let line = self.line;
             self.mesh.warnings.push((line, format!("a face with {corners} corners has no area and is left out")));
             // One warning is enough.
@@ -260,14 +303,14 @@ impl Reader<'_> {
             return Ok(());
         }
         // The number of triangles is bounded by that of the corners.
-        if self.corners.len() > self.limits.triangles.saturating_mul(3) {
+        if self.corners[0].len() > self.limits.triangles.saturating_mul(3) {
             return Err(self.error(
                 statement,
                 "too many faces",
                 format!("at most {} triangles are read", self.limits.triangles),
             ));
         }
-        self.faces.push(Face { end: self.corners.len(), line: self.line });
+        self.faces.push(Face { end: self.corners[0].len(), line: self.line });
         Ok(())
     }
 
@@ -292,8 +335,13 @@ impl Reader<'_> {
         Ok(narrow)
     }
 
+    /// How many vertices, texture coordinates and normals there are so far.
+    fn counts(&self) -> [u64; 3] {
+        [self.mesh.positions.len(), self.mesh.uvs.len(), self.mesh.normals.len()].map(|n| n as u64)
+    }
+
     fn finish(mut self) -> Result<Mesh, MeshError> {
-        let counts = [self.mesh.positions.len() as u64, self.texture_coordinates, self.normals];
+        let counts = self.counts();
         for ((farthest, count), kind) in
             self.farthest.iter_mut().zip(counts).zip(["vertices", "texture coordinates", "normals"])
         {
@@ -302,34 +350,52 @@ impl Reader<'_> {
                 return Err(error);
             }
         }
-        let Mesh { positions, mut triangles, mut warnings } = self.mesh;
-        triangles.reserve_exact(self.corners.len() - 2 * self.faces.len());
+        let Self { mut mesh, corners: [positions, uvs, normals], .. } = self;
+        mesh.triangles.reserve_exact(positions.len() - 2 * self.faces.len());
         let mut triangulator = Triangulator::default();
         let mut work = Work { left: self.limits.polygon_steps };
         let mut start = 0;
         let mut crossed = None;
+        // A polygon is cut as its corners are numbered, so that they keep what else they have.
+        let (mut places, mut numbers, mut cut) = (Vec::new(), Vec::new(), Vec::new());
         for Face { end, line } in self.faces {
-            let corners = &self.corners[start..end];
-            start = end;
-            let simple =
-                triangulator.triangulate(&positions, corners, &mut triangles, &mut work).ok_or_else(|| MeshError {
-                    line,
-                    message: format!(
-                        "a polygon of {} corners that is not convex takes too long to cut into triangles",
-                        corners.len()
-                    ),
-                    help: "cut the polygons into triangles when you export the mesh".to_owned(),
-                })?;
-            if !simple && crossed.is_none() {
-                crossed = Some(line);
+            let count = end - start;
+            cut.clear();
+            if count == 3 {
+                cut.push([0, 1, 2]);
+            } else {
+                places.clear();
+                places.extend(positions[start..end].iter().map(|&i| mesh.positions[i as usize]));
+                numbers.clear();
+                numbers.extend((0..).take(count));
+                let simple =
+                    triangulator.triangulate(&places, &numbers, &mut cut, &mut work).ok_or_else(|| MeshError {
+                        line,
+                        message: format!(
+                            "a polygon of {count} corners that is not convex takes too long to cut into triangles"
+                        ),
+                        help: "cut the polygons into triangles when you export the mesh".to_owned(),
+                    })?;
+                if !simple && crossed.is_none() {
+                    crossed = Some(line);
+                }
             }
+            let lists = [&positions, &uvs, &normals];
+            let triangles = [&mut mesh.triangles, &mut mesh.uv_triangles, &mut mesh.normal_triangles];
+            for (list, triangles) in lists.into_iter().zip(triangles) {
+                let of = |i: u32| list.get(start + i as usize).copied().unwrap_or(NO_INDEX);
+                if !list.is_empty() {
+                    triangles.extend(cut.iter().map(|t: &[u32; 3]| t.map(of)));
+                }
+            }
+            start = end;
         }
         if let Some(line) = crossed {
-            warnings.push((
+            mesh.warnings.push((
                 line,
                 "a polygon crosses or touches itself: which part of it is filled is not defined".to_owned(),
             ));
         }
-        Ok(Mesh { positions, triangles, warnings })
+        Ok(mesh)
     }
 }

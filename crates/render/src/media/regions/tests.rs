@@ -24,7 +24,7 @@ fn cuboid(min: Vec3, max: Vec3, turn: DMat3, shift: DVec3) -> Vec<Triangle> {
 }
 
 fn boundary(triangles: Vec<Triangle>, medium: u32) -> Boundary {
-    Boundary { triangles, interior: Some(MediumId(medium)), exterior: None }
+    Boundary { triangles, interior: Some(MediumId(medium)), exterior: None, ..Boundary::default() }
 }
 
 fn turned(angle: f64) -> DMat3 {
@@ -155,7 +155,8 @@ fn open_boundaries_close_together() {
     let at_wall = |t: &Triangle| t.vertices.iter().all(|v| v.x == 1.0);
     let (wall, left): (Vec<_>, Vec<_>) = cube(0.0).into_iter().partition(at_wall);
     let right: Vec<_> = cube(1.0).into_iter().filter(|t| !at_wall(t)).collect();
-    let wall = Boundary { triangles: wall, interior: Some(MediumId(0)), exterior: Some(MediumId(1)) };
+    let wall =
+        Boundary { triangles: wall, interior: Some(MediumId(0)), exterior: Some(MediumId(1)), ..Boundary::default() };
     let boundaries = [boundary(left, 0), boundary(right, 1), wall];
     let medium = |sigma_t| Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
     for (media, expected) in [

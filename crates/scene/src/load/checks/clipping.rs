@@ -1,7 +1,7 @@
 //! What the clip planes of the camera cut away.
 
 use glam::DVec3;
-use vdf_geometry::{Bounds, Segment, Triangle, intersect_exact};
+use vdf_geometry::{Bounds, CurvedShape, Segment, Triangle, intersect_exact};
 
 use super::super::Loader;
 use super::super::document::Place;
@@ -27,7 +27,9 @@ pub(super) fn warn(loader: &Loader<'_>, sensor: &PerspectiveSensor, film: &FilmS
     let reach = Bounds::of_points(rays.iter().flat_map(|ray| [ray.p, ray.q]));
     let jumped = loader.boundaries.iter().zip(&loader.boundary_elements).find(|(boundary, _)| {
         let near = |t: &&Triangle| Bounds::of_triangles([*t]).touches(&reach);
-        boundary.triangles.iter().filter(near).any(|t| rays.iter().any(|ray| intersect_exact(ray, t).is_some()))
+        let is_sphere_met = boundary.curved.is_some_and(|c| rays.iter().any(|ray| c.meets(ray)));
+        is_sphere_met
+            || boundary.triangles.iter().filter(near).any(|t| rays.iter().any(|ray| intersect_exact(ray, t).is_some()))
     });
     if let Some((_, element)) = jumped {
         loader.warn(
@@ -41,13 +43,19 @@ pub(super) fn warn(loader: &Loader<'_>, sensor: &PerspectiveSensor, film: &FilmS
 }
 
 fn nothing_to_see(loader: &Loader<'_>, sensor: &PerspectiveSensor, at: &Place) {
-    let shapes = || {
-        let surfaces = loader.surfaces.iter().map(|s| &s.triangles);
-        surfaces.chain(loader.boundaries.iter().map(|b| &b.triangles)).filter(|t| !t.is_empty())
+    let all = || {
+        let surfaces = loader.surfaces.iter().map(|s| (&s.triangles, s.curved));
+        surfaces.chain(loader.boundaries.iter().map(|b| (&b.triangles, b.curved)))
     };
+    let shapes = || all().filter(|(triangles, curved)| !triangles.is_empty() || curved.is_some());
     let (camera, forward) = (sensor.world_from_camera.w_axis.truncate(), sensor.world_from_camera.z_axis.truncate());
-    let is_seen = |triangles: &Vec<Triangle>| {
-        let depths = triangles.iter().flat_map(|t| t.vertices_f64()).map(|v| (v - camera).dot(forward));
+    let is_seen = |(triangles, curved): (&Vec<Triangle>, Option<CurvedShape>)| {
+        let corners = curved.map(|c| {
+            let Bounds { min, max } = *c.bounds();
+            (0..8).map(move |i| DVec3::select(glam::BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0), min, max))
+        });
+        let vertices = triangles.iter().flat_map(Triangle::vertices_f64);
+        let depths = vertices.chain(corners.into_iter().flatten()).map(|v| (v - camera).dot(forward));
         let (low, high) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), d| (low.min(d), high.max(d)));
         high >= sensor.near_clip && low <= sensor.far_clip
     };

@@ -1,8 +1,10 @@
 //! A medium boundary that separates an inside from an outside.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use robust::{Coord3D, orient3d};
-use vdf_geometry::{Bounds, Triangle};
+use vdf_geometry::{Bounds, CurvedShape, Triangle};
 
 use super::super::document::Element;
 use crate::{Boundary, MediumId};
@@ -34,7 +36,9 @@ impl Work {
 /// A closed boundary.
 #[derive(Debug)]
 pub(super) struct Closed<'a> {
-    triangles: &'a [Triangle],
+    /// Of a sphere some that lie near it: places to look at, no more.
+    triangles: Cow<'a, [Triangle]>,
+    sphere: Option<CurvedShape>,
     pub(super) element: &'a Element,
     /// The medium inside, whichever way the normals point.
     pub(super) inner: Option<MediumId>,
@@ -48,6 +52,13 @@ pub(super) struct Closed<'a> {
 impl<'a> Closed<'a> {
     /// The boundary must be closed.
     pub(super) fn new(boundary: &'a Boundary, element: &'a Element) -> Self {
+        if let Some(sphere) = boundary.curved {
+            let (inner, outer) = (boundary.interior, boundary.exterior);
+            let volume = sphere.placement().0.determinant().abs() * (4.0 / 3.0 * std::f64::consts::PI);
+            let triangles = Cow::Owned(near_sphere(&sphere));
+            let bounds = *sphere.bounds();
+            return Self { triangles, sphere: Some(sphere), element, inner, outer, volume, is_inverted: false, bounds };
+        }
         let bounds = Bounds::of_triangles(&boundary.triangles);
         // Sum of the signed tetrahedra; the sign tells which way the normals point.
         let centre = (bounds.min + bounds.max) / 2.0;
@@ -56,7 +67,8 @@ impl<'a> Closed<'a> {
         let is_inverted = volume < 0.0;
         let (inner, outer) =
             if is_inverted { (boundary.exterior, boundary.interior) } else { (boundary.interior, boundary.exterior) };
-        Self { triangles: &boundary.triangles, element, inner, outer, volume: volume.abs(), is_inverted, bounds }
+        let triangles = Cow::Borrowed(boundary.triangles.as_slice());
+        Self { triangles, sphere: None, element, inner, outer, volume: volume.abs(), is_inverted, bounds }
     }
 
     /// `"fog" at scene.xml:3:1`, for messages.
@@ -72,6 +84,9 @@ impl<'a> Closed<'a> {
     pub(super) fn winding(&self, p: DVec3) -> f64 {
         if !self.bounds.contains(p) {
             return 0.0;
+        }
+        if let Some(sphere) = &self.sphere {
+            return if sphere.side(p).is_lt() { 1.0 } else { 0.0 };
         }
         let total: f64 = self.triangles.iter().map(|t| half_solid_angle(t.vertices_f64().map(|v| v - p))).sum();
         total / (2.0 * std::f64::consts::PI)
@@ -181,6 +196,24 @@ fn goes_through(&[a, b]: &[DVec3; 2], &[p, q, r]: &[DVec3; 3], touching: f64) ->
     // The volume between two lines: their distance times the product of their directions.
     let around = [[p, q], [q, r], [r, p]].map(|[p, q]| (side(a, b, p, q), touching * (b - a).cross(q - p).length()));
     around.iter().all(|&(side, least)| side > least) || around.iter().all(|&(side, least)| side < -least)
+}
+
+/// An octahedron whose faces are divided twice, a little inside of the sphere.
+fn near_sphere(sphere: &CurvedShape) -> Vec<Triangle> {
+    let mut faces: Vec<[DVec3; 3]> = Vec::new();
+    for signs in 0..8_u32 {
+        let sign = |bit: u32| if signs >> bit & 1 == 0 { 1.0 } else { -1.0 };
+        faces.push([DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)]);
+    }
+    for _ in 0..2 {
+        let divided = |&[a, b, c]: &[DVec3; 3]| {
+            let [ab, bc, ca] = [a + b, b + c, c + a].map(DVec3::normalize);
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        };
+        faces = faces.iter().flat_map(divided).collect();
+    }
+    let inside = 1.0 - TOUCHING;
+    faces.iter().map(|f| Triangle { vertices: f.map(|p| sphere.to_world(p * inside).as_vec3()) }).collect()
 }
 
 fn centre(triangle: &Triangle) -> DVec3 {

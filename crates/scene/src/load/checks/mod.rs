@@ -60,7 +60,7 @@ fn closed_boundaries<'a>(loader: &'a Loader<'_>) -> Result<Vec<Closed<'a>>, Scen
         if same(loader, boundary.interior, boundary.exterior) {
             continue;
         }
-        if seams::hole(&boundary.triangles).is_none() {
+        if boundary.curved.is_some() || seams::hole(&boundary.triangles).is_none() {
             closed.push(Closed::new(boundary, element));
             continue;
         }

@@ -1,45 +1,124 @@
 //! Shapes: their triangles, and what is attached to them.
 
+mod curved;
 mod mesh_file;
 mod placement;
 mod standard;
 
-use vdf_geometry::Triangle;
+use std::sync::Arc;
 
+use glam::DMat4;
+use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
+
+use mesh_file::{Format, MeshOptions};
 use placement::Placement;
 
 use super::document::Element;
-use super::objects;
 use super::properties::Object;
-use super::{Loader, features, names};
-use crate::{Boundary, Bsdf, Emitter, MediumId, Surface};
+use super::{Loader, features, materials, names, objects};
+use crate::{Boundary, Bsdf, Emitter, MediumId, MeshAttributes, Surface, Texture};
 use crate::{Rgb, SceneError};
 
-/// Reads a shape into the scene.
+/// What a shape is made of.
+#[derive(Debug, Default)]
+struct Geometry {
+    triangles: Vec<Triangle>,
+    attributes: MeshAttributes,
+    curved: Option<CurvedShape>,
+}
+
+/// Reads a shape into the scene. A `shapegroup` is read where an `instance` refers to it, once for each.
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<(), SceneError> {
     let mut object = Object::new(loader, element, features::kinds("shape"))?;
-    let to_world = object.world_transform(loader)?;
-    let flip = object.boolean("flip_normals", false)?;
-    let mut placed = Placement::new(to_world);
     match object.kind() {
-        "obj" => {
-            object.boolean("flip_tex_coords", true)?;
-            if !object.boolean("face_normals", false)? {
-                loader.warn(
-                    &element.at,
-                    "the mesh has no face_normals=true: vdf shades with geometric normals, Mitsuba would smooth them",
-                );
+        "shapegroup" => Ok(()),
+        "instance" => {
+            let to_world = object.world_transform(loader)?;
+            let Some(group) = object.at_most_one("shape")? else {
+                return Err(object.error("no shapegroup", "refer to one, with <ref id=\"…\"/>"));
+            };
+            object.finish()?;
+            let mut members = Object::new(loader, group.object, &["shapegroup"])?;
+            for member in members.nested("shape") {
+                read_at(loader, member.object, to_world)?;
             }
-            let name = object
-                .string("filename")?
-                .ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
-            mesh_file::obj(loader, name, object.place_of("filename"), &mut placed)?;
+            members.finish()
         }
+        _ => read_at(loader, element, DMat4::IDENTITY),
+    }
+}
+
+/// Reads a shape that is no instance, and moves it by `outer` when it is where its own transform puts it.
+fn read_at<'a>(loader: &mut Loader<'a>, element: &'a Element, outer: DMat4) -> Result<(), SceneError> {
+    let mut object = Object::new(loader, element, features::kinds("shape"))?;
+    if matches!(object.kind(), "shapegroup" | "instance") {
+        return Err(object.error("groups and instances do not nest", "put the shapes themselves into the group"));
+    }
+    let to_world = outer * object.world_transform(loader)?;
+    let flip = object.boolean("flip_normals", false)?;
+    let is_mirrored = to_world.determinant() < 0.0;
+    let curved = curved::read(&mut object, to_world, flip)?;
+    let placed = if curved.is_none() {
+        triangles(loader, &mut object, Placement::new(to_world))?
+    } else {
+        Placement::new(to_world)
+    };
+    if is_mirrored && curved.is_none() {
+        loader.warn(
+            &element.at,
+            "to_world mirrors the shape: check which side its normals point to (flip_normals turns them)",
+        );
+    }
+    let (interior, exterior) = media(loader, &mut object)?;
+    let radiance = area_emitter(loader, &mut object)?;
+    let bsdf = match object.at_most_one("bsdf")? {
+        Some(nested) => materials::bsdf(loader, nested.object)?,
+        None => materials::default_bsdf(radiance.is_some()),
+    };
+    let mut placed = placed;
+    // As Mitsuba 3.9.1 was seen to do: the winding of the moved vertices decides on which side a medium is, and how a
+    // mesh shades; but cube and rectangle shade with their own normals, which a mirroring does not turn round.
+    let own_normals = bsdf != Bsdf::Null && matches!(object.kind(), "cube" | "rectangle");
+    if flip != (own_normals && is_mirrored) {
+        placed.turn();
+    }
+    if flip {
+        placed.attributes.normals.iter_mut().flatten().for_each(|n| *n = -*n);
+    }
+    object.finish()?;
+    let geometry = Geometry { triangles: placed.triangles, attributes: placed.attributes, curved };
+    attach(loader, element, geometry, bsdf, radiance, [interior, exterior])
+}
+
+/// The triangles of a shape that is not curved.
+fn triangles<'a>(
+    loader: &mut Loader<'a>,
+    object: &mut Object<'a>,
+    mut placed: Placement,
+) -> Result<Placement, SceneError> {
+    match object.kind() {
         "cube" => {
             object.boolean("face_normals", false)?;
             standard::cube(&mut placed);
         }
-        _ => standard::rectangle(&mut placed),
+        "rectangle" => standard::rectangle(&mut placed),
+        kind => {
+            let format = match kind {
+                "ply" => Format::Ply,
+                "serialized" => {
+                    let index = object.integer("shape_index", 0, 0..=i64::from(u32::MAX))?;
+                    Format::Serialized(usize::try_from(index).unwrap_or(usize::MAX))
+                }
+                _ => Format::Obj,
+            };
+            let face_normals = object.boolean("face_normals", false)?;
+            let flip_v = object.boolean("flip_tex_coords", kind == "obj")?;
+            let name = object
+                .string("filename")?
+                .ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
+            let options = MeshOptions { format, face_normals, flip_v };
+            mesh_file::read(loader, name, object.place_of("filename"), options, &mut placed)?;
+        }
     }
     if !placed.triangles.iter().all(Triangle::is_finite) {
         return Err(
@@ -49,78 +128,65 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     if let Some(message) = placed.lost_shape() {
         return Err(object.error(message, "move the whole scene closer to the origin, or make the shape larger"));
     }
-    let mut triangles = placed.triangles;
-    if to_world.determinant() < 0.0 {
-        loader.warn(
-            &element.at,
-            "to_world mirrors the shape: check which side its normals point to (flip_normals turns them)",
-        );
-    }
-    let (interior, exterior) = media(loader, &mut object)?;
-    let radiance = area_emitter(loader, &mut object)?;
-    let bsdf = match object.at_most_one("bsdf")? {
-        Some(nested) => objects::bsdf(loader, nested.object)?,
-        None => Some(objects::default_bsdf(radiance.is_some())),
-    };
-    // As Mitsuba 3.9.1 was seen to do: the winding of the moved vertices decides on which side a medium is, and how a
-    // mesh shades; but cube and rectangle shade with their own normals, which a mirroring does not turn round.
-    let own_normals = bsdf.is_some() && object.kind() != "obj";
-    let turned_back = own_normals && to_world.determinant() < 0.0;
-    if flip != turned_back {
-        for triangle in &mut triangles {
-            triangle.vertices.swap(1, 2);
-        }
-    }
-    object.finish()?;
-    attach(loader, element, triangles, bsdf, radiance, [interior, exterior])
+    Ok(placed)
 }
 
 fn attach<'a>(
     loader: &mut Loader<'a>,
     element: &'a Element,
-    triangles: Vec<Triangle>,
-    bsdf: Option<Bsdf>,
+    geometry: Geometry,
+    bsdf: Bsdf,
     radiance: Option<Rgb>,
     [interior, exterior]: [Option<MediumId>; 2],
 ) -> Result<(), SceneError> {
     let at = &element.at;
     let has_medium = interior.is_some() || exterior.is_some();
-    match bsdf {
-        Some(_) if has_medium => Err(at.error(
-            "a shape with an interior or exterior medium but without a null BSDF is opaque",
-            "add <bsdf type=\"null\"/> to let light through; without a BSDF Mitsuba 3 makes it diffuse 0.5",
-        )),
-        None if radiance.is_some() && has_medium => Err(at.error(
-            "an area emitter on the boundary of a medium",
-            "give the light its own shape, with a diffuse BSDF or none",
-        )),
+    if bsdf == Bsdf::Null && radiance.is_some() {
+        if has_medium {
+            return Err(at.error(
+                "an area emitter on the boundary of a medium",
+                "give the light its own shape, with a diffuse BSDF or none",
+            ));
+        }
         // The Blender add-on writes every area light so. In Mitsuba one can look through such a light; here it is black behind its
         // emission. The pictures are the same unless something is behind the light, or is seen or lit through its back.
-        None if radiance.is_some() => {
-            loader.warn(
-                at,
-                "an area emitter with a null BSDF: Mitsuba lets light through it, here it is opaque and black",
-            );
-            attach(loader, element, triangles, Some(objects::default_bsdf(true)), radiance, [None, None])
-        }
-        None if has_medium => {
-            loader.boundaries.push(Boundary { triangles, interior, exterior });
-            loader.boundary_elements.push(element);
-            Ok(())
-        }
-        None => {
-            // Such a shape does not even change the medium, so nothing is left of it.
-            loader.warn(at, "a null shape without a medium has no effect");
-            Ok(())
-        }
-        Some(bsdf) => {
-            if radiance.is_some() {
-                loader.emitters.push(Emitter::Area { surface: loader.surfaces.len() });
-            }
-            loader.surfaces.push(Surface { triangles, bsdf, radiance });
-            Ok(())
-        }
+        loader.warn(at, "an area emitter with a null BSDF: Mitsuba lets light through it, here it is opaque and black");
+        return attach(loader, element, geometry, materials::default_bsdf(true), radiance, [None, None]);
     }
+    if bsdf == Bsdf::Null && !has_medium {
+        // Such a shape does not even change the medium, so nothing is left of it.
+        loader.warn(at, "a null shape without a medium has no effect");
+        return Ok(());
+    }
+    if has_medium && !bsdf.transmits() {
+        loader.warn(
+            at,
+            "a medium inside of an opaque shape is not seen: <bsdf type=\"null\"/> lets light through; without a BSDF Mitsuba 3 makes it diffuse 0.5",
+        );
+    } else if has_medium {
+        let (triangles, curved) = (geometry.triangles.clone(), geometry.curved);
+        if curved.is_some_and(|c| c.kind() != CurvedKind::Sphere) {
+            let help = "of the curved shapes only a sphere encloses a medium; use a mesh that is closed";
+            return Err(at.error("the medium boundary is open: a disk or a cylinder has rims", help));
+        }
+        // `interior` is behind the normals, which a sphere may have turned round.
+        let turned = curved.is_some_and(|c| c.is_flipped());
+        let (interior, exterior) = if turned { (exterior, interior) } else { (interior, exterior) };
+        loader.boundaries.push(Boundary { triangles, curved, interior, exterior });
+        loader.boundary_elements.push(element);
+    }
+    if bsdf == Bsdf::Null {
+        return Ok(());
+    }
+    if radiance.is_some() {
+        loader.emitters.push(Emitter::Area { surface: loader.surfaces.len() });
+    }
+    let Geometry { triangles, mut attributes, curved } = geometry;
+    if bsdf.textures().iter().all(|t| matches!(t, Texture::Constant(_))) && !bsdf.has_directions() {
+        attributes.uvs = Vec::new();
+    }
+    loader.surfaces.push(Surface { triangles, curved, attributes: Arc::new(attributes), bsdf, radiance });
+    Ok(())
 }
 
 fn media<'a>(

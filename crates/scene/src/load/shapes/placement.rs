@@ -1,7 +1,9 @@
 //! The triangles of a shape at their place in the world.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, Vec2};
 use vdf_geometry::Triangle;
+
+use crate::MeshAttributes;
 
 /// A shape may be displaced by its rounding to single precision by this share of its longest side.
 const MOST_LOST: f64 = 1.0 / 256.0;
@@ -11,6 +13,7 @@ const MOST_LOST: f64 = 1.0 / 256.0;
 pub(super) struct Placement {
     to_world: DMat4,
     pub(super) triangles: Vec<Triangle>,
+    pub(super) attributes: MeshAttributes,
     /// Bounds before the rounding.
     low: DVec3,
     high: DVec3,
@@ -20,8 +23,35 @@ pub(super) struct Placement {
 
 impl Placement {
     /// Nothing yet.
-    pub(super) const fn new(to_world: DMat4) -> Self {
-        Self { to_world, triangles: Vec::new(), low: DVec3::INFINITY, high: DVec3::NEG_INFINITY, lost: 0.0 }
+    pub(super) fn new(to_world: DMat4) -> Self {
+        Self {
+            to_world,
+            triangles: Vec::new(),
+            attributes: MeshAttributes::default(),
+            low: DVec3::INFINITY,
+            high: DVec3::NEG_INFINITY,
+            lost: 0.0,
+        }
+    }
+
+    /// The transform.
+    pub(super) const fn to_world(&self) -> DMat4 {
+        self.to_world
+    }
+
+    /// Adds a rectangle with its texture coordinates, corner by corner around it.
+    pub(super) fn push_quad(&mut self, [a, b, c, d]: [DVec3; 4], uv: impl Fn(DVec3) -> Vec2) {
+        for corners in [[a, b, c], [a, c, d]] {
+            self.push(corners);
+            self.attributes.uvs.push(corners.map(&uv));
+        }
+    }
+
+    /// Turns all triangles round, with what their corners carry.
+    pub(super) fn turn(&mut self) {
+        self.triangles.iter_mut().for_each(|t| t.vertices.swap(1, 2));
+        self.attributes.uvs.iter_mut().for_each(|uvs| uvs.swap(1, 2));
+        self.attributes.normals.iter_mut().for_each(|normals| normals.swap(1, 2));
     }
 
     /// Adds a triangle, given before the transform.

@@ -1,0 +1,141 @@
+//! Textures and the pictures that they are made of.
+
+use std::collections::hash_map::Entry;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec2;
+use image::{DynamicImage, ImageReader};
+
+use super::document::{Element, Place};
+use super::properties::Object;
+use super::{Loader, features, transform};
+use crate::{Pixels, Rgb, SceneError, Texture, TextureFilter, UvTransform, Wrap};
+
+/// All pictures of a scene have at most this many pixels together; each takes twelve bytes.
+const MAX_PIXELS: u64 = 1 << 28;
+/// And their files at most this many bytes.
+const MAX_FILE_BYTES: u64 = 4 << 30;
+/// Textures nest at most this deep.
+const MAX_DEPTH: usize = 8;
+
+/// A texture.
+pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Texture, SceneError> {
+    read_within(loader, element, 0)
+}
+
+fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> Result<Texture, SceneError> {
+    let mut object = Object::new(loader, element, features::kinds("texture"))?;
+    if depth == MAX_DEPTH {
+        return Err(object.error("textures nest too deep", ""));
+    }
+    let to_uv = uv_transform(loader, &mut object)?;
+    let texture = if object.kind() == "checkerboard" {
+        let mut colour = |name, default| match object.texture_element(name)? {
+            Some(nested) => read_within(loader, nested, depth + 1),
+            None => object.reflectance(loader, name, default).map(Texture::Constant),
+        };
+        let (first, second) = (colour("color0", 0.4)?, colour("color1", 0.2)?);
+        Texture::Checkerboard { first: Box::new(first), second: Box::new(second), to_uv }
+    } else {
+        bitmap(loader, &mut object, to_uv)?
+    };
+    object.finish()?;
+    Ok(texture)
+}
+
+fn bitmap<'a>(loader: &Loader<'a>, object: &mut Object<'a>, to_uv: UvTransform) -> Result<Texture, SceneError> {
+    let raw = object.boolean("raw", false)?;
+    let filter = match object.choice("filter_type", "bilinear", &["bilinear", "nearest"])? {
+        "nearest" => TextureFilter::Nearest,
+        _ => TextureFilter::Bilinear,
+    };
+    let wrap = match object.choice("wrap_mode", "repeat", &["repeat", "mirror", "clamp"])? {
+        "mirror" => Wrap::Mirror,
+        "clamp" => Wrap::Clamp,
+        _ => Wrap::Repeat,
+    };
+    object.choice("format", "auto", &["auto", "variant", "fp16"])?;
+    object.boolean("accel", true)?;
+    let name =
+        object.string("filename")?.ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
+    let image = pixels(loader, name, object.place_of("filename"), raw)?;
+    Ok(Texture::Bitmap { image, filter, wrap, to_uv })
+}
+
+/// `to_uv`: what of a transform concerns x and y.
+fn uv_transform(loader: &Loader<'_>, object: &mut Object<'_>) -> Result<UvTransform, SceneError> {
+    let Some(element) = object.transform_element("to_uv")? else { return Ok(UvTransform::default()) };
+    let m = transform::read(loader, element)?;
+    let flat = |v: glam::DVec4| DVec2::new(v.x, v.y);
+    // A matrix of nine numbers is one of texture coordinates, its third column their translation.
+    let translation = if transform::is_three_by_three(element) { flat(m.z_axis) } else { flat(m.w_axis) };
+    Ok(UvTransform { columns: [flat(m.x_axis), flat(m.y_axis)], offset: translation })
+}
+
+/// The pictures that were read, by their path and whether they are raw.
+pub(super) type Pictures = std::collections::HashMap<(PathBuf, bool), Arc<Pixels>>;
+
+/// The picture in a file, in linear RGB unless it is `raw`. Each file is read once.
+pub(super) fn pixels(loader: &Loader<'_>, name: &str, at: &Place, raw: bool) -> Result<Arc<Pixels>, SceneError> {
+    let path = loader.search.mesh(loader.source, name);
+    let mut pictures = loader.pictures.borrow_mut();
+    let used: u64 = pictures.values().map(|p| p.rgb.len() as u64).sum();
+    match pictures.entry((path, raw)) {
+        Entry::Occupied(entry) => Ok(Arc::clone(entry.get())),
+        Entry::Vacant(entry) => {
+            let path = entry.key().0.clone();
+            let unreadable = |why: &dyn std::fmt::Display| {
+                at.error(
+                    format!("cannot read \"{}\": {why}", path.display()),
+                    "pictures are PNG, JPEG, OpenEXR, Radiance HDR, BMP or TGA files; the path is relative to the folder of the scene file, or to a folder of a <path>",
+                )
+            };
+            let image = decoded(loader, &path, MAX_PIXELS.saturating_sub(used)).map_err(|e| unreadable(&e))?;
+            Ok(Arc::clone(entry.insert(Arc::new(linear(&image, raw)))))
+        }
+    }
+}
+
+fn decoded(loader: &Loader<'_>, path: &Path, most: u64) -> Result<DynamicImage, Box<dyn std::error::Error>> {
+    let (input, _) = loader.source.open(path, MAX_FILE_BYTES)?;
+    let mut file = Vec::new();
+    input.take(MAX_FILE_BYTES).read_to_end(&mut file)?;
+    let reader = |file| ImageReader::new(std::io::Cursor::new(file)).with_guessed_format();
+    let mut of_size = reader(&file)?;
+    // TGA files have nothing to be known by.
+    if of_size.format().is_none()
+        && let Ok(format) = image::ImageFormat::from_path(path)
+    {
+        of_size.set_format(format);
+    }
+    let format = of_size.format();
+    let (width, height) = of_size.into_dimensions()?;
+    let count = u64::from(width) * u64::from(height);
+    if count > most || count == 0 {
+        return Err(format!("it has {width} × {height} pixels; at most {most} are read").into());
+    }
+    let mut reader = reader(&file)?;
+    if let Some(format) = format {
+        reader.set_format(format);
+    }
+    let mut limits = image::Limits::no_limits();
+    // Four channels of four bytes, and what a decoder needs besides.
+    limits.max_alloc = Some(count * 64 + (64 << 20));
+    reader.limits(limits);
+    Ok(reader.decode()?)
+}
+
+/// Linear RGB in single precision: integers are sRGB, unless raw; what is not finite or negative becomes zero.
+fn linear(image: &DynamicImage, raw: bool) -> Pixels {
+    let is_float = matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
+    let decode = |v: f32| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    let channel = |v: f32| {
+        let v = if is_float || raw { v } else { decode(v) };
+        if v.is_finite() { v.max(0.0) } else { 0.0 }
+    };
+    let rgb = image.to_rgb32f();
+    let rgb = rgb.pixels().map(|p| Rgb::from_array(p.0.map(channel))).collect();
+    Pixels { width: image.width(), height: image.height(), rgb }
+}
