@@ -9,7 +9,7 @@ use vdf::{
 
 use crate::{
     common::{Options, add_fog, add_medium, cuboid, empty_scene, integrate, mean_and_error, options, rendered},
-    room::{BACK, BOTH, GREY, bits, room, same_for_all_methods, wall},
+    room::{BACK, BOTH, bits, room, same_for_all_methods, wall},
 };
 
 /// The airlight integral along +Z with any transmittance towards the light.

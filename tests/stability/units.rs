@@ -9,7 +9,7 @@ use vdf::{
 
 use crate::{
     common::{self, Options, builtin, empty_scene, mean_and_error, options, rendered},
-    room::{BOTH, FRONT, GREY, bits, room, same_for_all_methods, wall},
+    room::{BOTH, FRONT, bits, room, same_for_all_methods, wall},
 };
 
 /// The scene in other units and elsewhere: x becomes scale·x + shift. The picture is the same.
