@@ -107,13 +107,13 @@ pub(crate) struct ShadingPoint {
 impl ShadingPoint {
     /// A direction of the world in the shading frame.
     #[inline]
-    pub(crate) fn to_local(&self, d: DVec3) -> DVec3 {
+    pub(crate) fn local(&self, d: DVec3) -> DVec3 {
         dvec3(self.frame[0].dot(d), self.frame[1].dot(d), self.frame[2].dot(d))
     }
 
     /// A direction of the shading frame in the world.
     #[inline]
-    pub(crate) fn to_world(&self, d: DVec3) -> DVec3 {
+    pub(crate) fn world(&self, d: DVec3) -> DVec3 {
         (self.frame[0] * d.x + self.frame[1] * d.y + self.frame[2] * d.z).normalize_or(self.frame[2])
     }
 }

@@ -74,7 +74,7 @@ impl<R: Recorder> Tracer<'_, R> {
         let Some(sample) = material.sample(shading.wi, shading.uv, choice, u) else { return false };
         let direction = match sample.lobe {
             Lobe::Null => path.ray.direction,
-            Lobe::Smooth | Lobe::Delta => shading.to_world(sample.wo),
+            Lobe::Smooth | Lobe::Delta => shading.world(sample.wo),
         };
         let (point, regions) = if direction.dot(surface.normal) < 0.0 {
             self.behind(surface, shading, &regions)
@@ -107,5 +107,5 @@ impl<R: Recorder> Tracer<'_, R> {
 #[inline(never)]
 pub(super) fn eval(world: &World, shading: &ShadingPoint, to: DVec3) -> (Rgb, f64) {
     let material = &world.materials[shading.material as usize].material;
-    material.eval(shading.wi, shading.to_local(to), shading.uv)
+    material.eval(shading.wi, shading.local(to), shading.uv)
 }

@@ -14,7 +14,7 @@ use crate::world::{curved_lift, lift};
 pub(super) struct AreaLight {
     triangles: Vec<Triangle>,
     /// In place of triangles.
-    curved: Option<CurvedShape>,
+    curved: Option<Box<CurvedShape>>,
     /// Running sum of the triangles' areas.
     cumulative_area: Vec<f64>,
     radiance: Rgb,
@@ -41,7 +41,7 @@ impl AreaLight {
             })
             .collect();
         let cumulative_area = curved.map_or(cumulative_area, |c| vec![curved_area(&c)]);
-        Self { triangles, curved, cumulative_area, radiance }
+        Self { triangles, curved: curved.map(Box::new), cumulative_area, radiance }
     }
 
     fn area(&self) -> f64 {
