@@ -159,7 +159,7 @@ mod tests {
     use crate::{Sampler, chi_squared::assert_drawn_from};
 
     fn light(width: u32, height: u32) -> EnvmapLight {
-        let value = |i: u32| ((i * 7919) % 23) as f32 * if i % 5 == 0 { 0.0 } else { 1.0 };
+        let value = |i: u32| ((i * 7919) % 23) as f32 * if i.is_multiple_of(5) { 0.0 } else { 1.0 };
         let rgb = (0..width * height).map(|i| Rgb::new(value(i), value(i + 1), 0.5)).collect();
         let rotation = DMat4::from_rotation_y(0.7) * DMat4::from_rotation_x(-0.4);
         EnvmapLight::new(&std::sync::Arc::new(Pixels { width, height, rgb }), 2.0, &rotation)
