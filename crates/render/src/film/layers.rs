@@ -260,7 +260,8 @@ impl LayerSums {
         let ratio = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
         let mut channels = channels.iter_mut();
         let mut set = |values: &[f64]| {
-            for (channel, value) in (&mut channels).zip(values) {
+            // In this order: the values end first, and a channel that was taken without one would be lost.
+            for (value, channel) in values.iter().zip(&mut channels) {
                 channel.values[at] = *value as f32;
             }
         };
