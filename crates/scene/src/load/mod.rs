@@ -84,6 +84,7 @@ impl Scene {
             pictures: RefCell::default(),
             mesh_bytes: 0,
             triangles: 0,
+            copies: 0,
             media: Vec::new(),
             medium_of_element: HashMap::new(),
             surfaces: Vec::new(),
@@ -108,6 +109,8 @@ struct Loader<'a> {
     mesh_bytes: u64,
     /// Triangles of mesh files so far.
     triangles: usize,
+    /// Shapes that instances have made so far.
+    copies: usize,
     media: Vec<Medium>,
     medium_of_element: HashMap<usize, MediumId>,
     surfaces: Vec<Surface>,

@@ -286,6 +286,10 @@ fn instances_move_the_shapes_of_their_group() {
         "{group}<shape type='shapegroup' id='h'><ref id='g'/></shape><shape type='instance'><ref id='h'/></shape>"
     );
     refused(&nested, "3:1", "do not nest");
+    let many = format!("<shape type='shapegroup' id='m'>{}</shape>", "<shape type='rectangle'/>".repeat(1000));
+    let one = "<shape type='instance'><ref id='m'/></shape>";
+    let place = format!("3:{}", many.len() + 100 * one.len() + 1);
+    refused(&format!("{many}{}", one.repeat(101)), &place, "make more than 100000 shapes");
 }
 
 /// Curved shapes stay what they are, with Mitsuba's parameters; what they cannot be is refused.

@@ -27,6 +27,9 @@ struct Geometry {
     curved: Option<CurvedShape>,
 }
 
+/// Shapes that instances may make: a line of XML makes thousands, and each takes a kilobyte.
+const MOST_COPIES: usize = 100_000;
+
 /// Reads a shape into the scene. A `shapegroup` is read where an `instance` refers to it, once for each.
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<(), SceneError> {
     let mut object = Object::new(loader, element, features::kinds("shape"))?;
@@ -39,7 +42,15 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
             };
             object.finish()?;
             let mut members = Object::new(loader, group.object, &["shapegroup"])?;
-            for member in members.nested("shape") {
+            let shapes = members.nested("shape");
+            loader.copies += shapes.len();
+            if loader.copies > MOST_COPIES {
+                let message = format!("the instances up to here make more than {MOST_COPIES} shapes");
+                return Err(element
+                    .at
+                    .error(message, "an instance is a copy here: join the shapes of a group into one mesh"));
+            }
+            for member in shapes {
                 read_at(loader, member.object, to_world)?;
             }
             members.finish()
