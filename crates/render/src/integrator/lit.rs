@@ -91,7 +91,7 @@ impl<R: Recorder> Tracer<'_, R> {
             }
             let u = (f64::from(k) + sampler.next_1d()) / f64::from(fog.samples);
             let flight = self.flight_to_emitter(sampler);
-            let Some((choice, u)) = choose(&choices, u) else { break };
+            let Some((choice, u)) = self.draw_point(&choices, u) else { break };
             if known.as_ref().is_none_or(|(of, _)| *of != choice.emitter) {
                 known = Some((choice.emitter, self.lit(fog, stretches, &choice.place, counters)));
             }
@@ -133,7 +133,20 @@ impl<R: Recorder> Tracer<'_, R> {
         sum / fog.samples as f32
     }
 
-    /// The point emitters, and how likely each is drawn.
+    /// A point emitter, and what is left of the number that draws it: one of these choices, or any if there were too many to compare.
+    #[inline]
+    fn draw_point(&self, choices: &[Choice], u: f64) -> Option<(Choice, f64)> {
+        let points = self.world.lights.points();
+        if points.len() <= COMPARED {
+            return choose(choices, u).map(|(choice, u)| (*choice, u));
+        }
+        let (i, u) = super::choose(u, points.len())?;
+        let (emitter, position, _) = points[i];
+        let probability = 1.0 / points.len() as f64;
+        Some((Choice { emitter, place: LightPlace { position, normal: None }, probability }, u))
+    }
+
+    /// The point emitters, and how likely each is drawn; none if there are too many to compare.
     fn likely_points(&self, fog: &Fog<'_>, stretches: &[Stretch]) -> SmallVec<[Choice; COMPARED]> {
         let points = self.world.lights.points();
         let n = points.len();
@@ -143,6 +156,9 @@ impl<R: Recorder> Tracer<'_, R> {
             probability,
         };
         let mut choices: SmallVec<[Choice; COMPARED]> = SmallVec::new();
+        if n > COMPARED {
+            return choices;
+        }
         let mut sum = 0.0;
         for point in points {
             let mut choice = choice(point, 1.0);
@@ -305,7 +321,11 @@ mod tests {
             // In the tall block, if there is one.
             (dvec3(370.0, 100.0, 350.0), 1e6),
         ];
-        for (name, lights) in [("cbox_vol2", &[][..]), ("cbox_vol4", &several), ("cbox_light", &several[..1])] {
+        // More than are compared.
+        let many = [(); COMPARED + 1].map(|()| (dvec3(250.0, 400.0, 250.0), 1e6));
+        let cases =
+            [("cbox_vol2", &[][..]), ("cbox_vol4", &several), ("cbox_light", &several[..1]), ("cbox_vol2", &many)];
+        for (name, lights) in cases {
             let options = PrepareOptions::with_method(Method::NONE);
             let prepared = PreparedScene::new(scene(name, lights), &options, &Quiet).expect("it is prepared");
             let (asked, of_queries) = image(&prepared, Estimator::Equiangular, 4, 48, 5);
