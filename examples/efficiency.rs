@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 
 use anyhow::{Context as _, anyhow};
 use vdf::{
-    render::{Estimator, Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions, SamplerKind},
+    render::{Estimator, Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions, SamplerKind, SegmentSamples},
     scene::{Bsdf, IntegratorSettings, LoadOptions, Rgb, Scene, SceneSource},
     scenes::builtin,
     visibility::Counters,
@@ -98,10 +98,12 @@ fn main() -> anyhow::Result<()> {
         surface.bsdf = Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO);
     }
     let raymarch = |n| Integrator::raymarch(n);
+    let auto = Integrator::Raymarch(SegmentSamples::Auto);
     let direct = Scene { integrator: once, ..scene.clone() };
     for (what, scene, integrators) in [
-        ("scattered once in the medium", black, &[raymarch(7), raymarch(1), raymarch(2)][..]),
-        ("with the direct light of surfaces", direct, &[raymarch(7), raymarch(2)]),
+        ("scattered once in the medium", black, &[raymarch(7), raymarch(1), raymarch(2), auto][..]),
+        ("with the direct light of surfaces", direct, &[raymarch(7), raymarch(2), auto]),
+        ("marched, any number of surfaces", scene.clone(), &[raymarch(7), raymarch(2), auto]),
         ("all light", scene, &[Integrator::Volpath]),
     ] {
         let prepared = PreparedScene::new(scene, &PrepareOptions::default(), &Quiet)?;

@@ -38,7 +38,7 @@ fn all_alike(name: &str, scene: &Scene, base: &Options, voxel_sizes: &[f64]) -> 
     (proving, images)
 }
 
-const INTEGRATORS: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 5 }];
+const INTEGRATORS: [Integrator; 2] = [Integrator::Volpath, Integrator::raymarch(5)];
 
 #[test]
 fn images_do_not_depend_on_method_voxel_size_or_threads() {

@@ -4,7 +4,7 @@
 use glam::{dvec3, vec3};
 use vdf::{
     geometry::Triangle,
-    render::{Estimator, Integrator, SamplerKind},
+    render::{Estimator, Integrator, SamplerKind, SegmentSamples},
     scene::{Bsdf, Emitter, IntegratorSettings, Phase, Rgb, Scene, Surface},
 };
 
@@ -61,15 +61,18 @@ fn the_integrators_agree_where_their_models_do() {
             rendered(&scene, &o).image.pixels
         };
         let traced = image(VOLPATH, Estimator::Thesis, SamplerKind::Independent, 512, 1);
-        for (estimator, sampler) in Estimator::ALL.into_iter().flat_map(|e| SamplerKind::ALL.map(|s| (e, s))) {
-            let marched = image(Integrator::Raymarch { samples_per_segment: 8 }, estimator, sampler, 96, 2);
+        let all = Estimator::ALL.into_iter().flat_map(|e| SamplerKind::ALL.map(|s| (Integrator::raymarch(8), e, s)));
+        let auto = Integrator::Raymarch(SegmentSamples::Auto);
+        let by_need = Estimator::ALL.map(|e| (auto, e, SamplerKind::Independent));
+        for (integrator, estimator, sampler) in all.chain(by_need) {
+            let marched = image(integrator, estimator, sampler, 96, 2);
             let n = traced.len() as f64;
             let differences: Vec<f64> = traced.iter().zip(&marched).map(|(a, b)| f64::from(a.x - b.x)).collect();
             let mean = differences.iter().sum::<f64>() / n;
             let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
             let level = traced.iter().map(|p| f64::from(p.x)).sum::<f64>() / n;
             println!(
-                "{name}, {estimator:?}, {sampler:?}: volpath − raymarch = {:.1e} ± {:.1e} of the mean",
+                "{name}, {integrator}, {estimator:?}, {sampler:?}: volpath − raymarch = {:.1e} ± {:.1e} of the mean",
                 mean / level,
                 error / level
             );

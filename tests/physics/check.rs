@@ -13,7 +13,7 @@ use crate::common::{Options, mean_and_error, options, rendered};
 
 pub(crate) const VOLPATH: Integrator = Integrator::Volpath;
 /// So many strata that hardly any noise is left.
-pub(crate) const RAYMARCH: Integrator = Integrator::Raymarch { samples_per_segment: 64 };
+pub(crate) const RAYMARCH: Integrator = Integrator::raymarch(64);
 pub(crate) const INTEGRATORS: [Integrator; 2] = [VOLPATH, RAYMARCH];
 /// The ways to trace paths of any number of events.
 pub(crate) const TRACED: [(Integrator, Estimator); 2] =
@@ -63,10 +63,10 @@ impl Check {
         match (self.integrator, self.estimator) {
             (Integrator::Volpath, Estimator::Thesis) => "volpath",
             (Integrator::Volpath, Estimator::Equiangular) => "volpath, equiangular",
-            (Integrator::Raymarch { .. }, Estimator::Thesis) => "raymarch",
-            (Integrator::Raymarch { .. }, Estimator::Equiangular) => "raymarch, equiangular",
+            (Integrator::Raymarch(_), Estimator::Thesis) => "raymarch",
+            (Integrator::Raymarch(_), Estimator::Equiangular) => "raymarch, equiangular",
             (Integrator::Volpath, Estimator::Lit) => "volpath, lit",
-            (Integrator::Raymarch { .. }, Estimator::Lit) => "raymarch, lit",
+            (Integrator::Raymarch(_), Estimator::Lit) => "raymarch, lit",
         }
     }
 

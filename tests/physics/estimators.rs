@@ -9,7 +9,7 @@ use vdf::{
 
 use crate::common::{Options, add_fog, add_medium, cuboid, empty_scene, options, rendered};
 
-const INTEGRATORS: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 4 }];
+const INTEGRATORS: [Integrator; 2] = [Integrator::Volpath, Integrator::raymarch(4)];
 
 fn image(scene: &Scene, integrator: Integrator, transmittance: TransmittanceEstimator, seed: u64) -> Vec<Rgb> {
     let o = Options { integrator, transmittance, seed: Some(seed), ..options() };

@@ -8,5 +8,6 @@ mod common;
 mod estimators;
 mod fog;
 mod furnace;
+mod stopping;
 mod surfaces;
 mod transmittance;

@@ -10,7 +10,7 @@ use vdf::{
 
 use crate::common::{Options, add_fog, add_medium, cuboid, empty_scene, options, rendered};
 
-pub(crate) const BOTH: [Integrator; 2] = [Integrator::Volpath, Integrator::Raymarch { samples_per_segment: 4 }];
+pub(crate) const BOTH: [Integrator; 2] = [Integrator::Volpath, Integrator::raymarch(4)];
 
 pub(crate) const GREY: Bsdf = Bsdf::lambertian(Rgb::splat(FRONT), Rgb::splat(BACK));
 /// The reflectances of its sides.

@@ -12,7 +12,7 @@ use clap::{
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
 use vdf_image::metrics::PIXELS_PER_DEGREE;
-use vdf_render::{GridExtent, Integrator, Layer};
+use vdf_render::{GridExtent, Integrator, Layer, SegmentSamples};
 use vdf_scene::PixelRect;
 use vdf_visibility::{Method, UnknownMethod};
 
@@ -77,9 +77,9 @@ pub(crate) struct RenderArgs {
     /// How light is followed
     #[arg(long, value_name = "INTEGRATOR", default_value = "volpath", value_parser = integrator_parser())]
     pub(crate) integrator: Integrator,
-    /// Samples on each path segment, for raymarch only [default: 7]
-    #[arg(long, value_name = "N")]
-    pub(crate) samples_per_segment: Option<u32>,
+    /// Samples on each path segment, for raymarch only; auto takes as many as the segment is worth, up to 16 [default: 7]
+    #[arg(long, value_name = "auto|N")]
+    pub(crate) samples_per_segment: Option<SegmentSamples>,
     /// Transmittance towards emitters: exp(-tau), or the 0/1 estimate of other renderers, noisier and of the same mean
     #[arg(long, value_enum, default_value_t = TransmittanceName::Analytic)]
     pub(crate) transmittance: TransmittanceName,

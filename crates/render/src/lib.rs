@@ -53,10 +53,11 @@ mod world;
 pub use camera::Camera;
 pub use error::RenderError;
 pub use film::{
-    Film, FilmError, FilmFileError, FilmOrigin, FilmRun, Layer, Layers, MissingSamples, Picture, UnknownLayer,
+    Film, FilmError, FilmFileError, FilmOrigin, FilmRun, Layer, Layers, MissingSamples, NoNoiseLimit, NoiseLimit,
+    Picture, UnknownLayer,
 };
 pub use filter::{FilterSample, PixelFilter};
-pub use integrator::{Integrator, UnknownIntegrator};
+pub use integrator::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};
 pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals, RegionSet};
@@ -67,7 +68,7 @@ pub use phase::PhaseFunction;
 pub use prepared::{PreparedScene, default_voxel_size};
 pub use render::{FilmPart, LiveFilm, Rendering};
 pub use sampler::{Sampler, SamplerKind};
-pub use statistics::{NeighbourhoodSize, PartSize, Statistics};
+pub use statistics::{NeighbourhoodSize, NoiseFigures, PartSize, Statistics};
 pub use threads::{check_threads, on_threads, thread_count};
 pub use vdf_visibility::{Progress, Quiet};
 pub use world::{SurfacePoint, World, light_shapes};

@@ -3,7 +3,10 @@
 use vdf_scene::{PixelRect, Scene};
 use vdf_visibility::Method;
 
-use crate::{Integrator, Layers, RenderError, SamplerKind, threads::check_threads};
+use crate::{
+    Integrator, Layers, NoiseLimit, RenderError, SamplerKind, SegmentSamples, film::layers_of_noise,
+    threads::check_threads,
+};
 
 /// The estimator of transmittance towards emitters; both have the same mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -180,9 +183,17 @@ pub struct RenderOptions {
     pub segment_first: bool,
     /// What is kept beside the picture. Layers of surfaces cost one more ray a sample.
     pub layers: Layers,
+    /// At what noise a tile of 16 × 16 pixels gets no more samples; `spp` is then the most that any gets.
+    pub noise: Option<NoiseLimit>,
 }
 
 impl RenderOptions {
+    /// The layers that a film of this render keeps: those asked for, and `variance` and `samples` if there is a limit of noise.
+    #[must_use]
+    pub fn kept_layers(&self) -> Layers {
+        if self.noise.is_some() { self.layers.with(layers_of_noise()) } else { self.layers }
+    }
+
     /// Checks what can be checked before anything is built.
     ///
     /// # Errors
@@ -192,7 +203,7 @@ impl RenderOptions {
             return Err(RenderError::option("spp", "must be at least 1"));
         }
         check_threads(self.threads)?;
-        if self.integrator.samples_per_segment() == Some(0) {
+        if self.integrator.samples_per_segment() == Some(SegmentSamples::Count(0)) {
             return Err(RenderError::option("samples-per-segment", "must be at least 1"));
         }
         if let Some(c) = self.crop {

@@ -147,7 +147,8 @@ impl PreparedScene {
     pub fn statistics(&self, options: &RenderOptions, film: &Film, spp: u32) -> Result<Statistics, RenderError> {
         let job = self.job(options)?;
         let seconds = film.runs().iter().map(|run| run.t_render).sum();
-        on_threads(options.threads, || Ok(Statistics::new(&job, film.counters(), spp, seconds)))
+        let noise = film.noise_figures();
+        on_threads(options.threads, || Ok(Statistics { noise, ..Statistics::new(&job, film.counters(), spp, seconds) }))
     }
 
     /// What a film is to remember of a run that has rendered for `t_render` seconds and made `paths` paths.

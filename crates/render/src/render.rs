@@ -123,9 +123,10 @@ pub(crate) fn empty_film(job: &Job<'_>, name: &str) -> Result<Film, RenderError>
         seed: job.seed(),
         full_size: [scene.film.width, scene.film.height],
         crop: job.crop(),
-        layers: options.layers,
+        layers: options.kept_layers(),
         method: options.layers.depend_on_method().then(|| job.prepared().method().name().to_owned()),
         spp: job.spp(),
+        noise: options.noise,
     };
     let picture = Picture {
         name: name.to_owned(),
@@ -166,8 +167,11 @@ pub(crate) fn add_part<'a>(
     let tiles: Vec<(usize, PixelRect)> =
         job.tiles().into_iter().enumerate().filter(|(i, _)| part.has_tile(*i)).collect();
     tiles.into_par_iter().try_for_each(|(number, tile)| {
-        let missing = film.lock().missing_of_tile(number, part.samples.clone());
-        for samples in missing {
+        // Asked again and again, for with a limit of noise it is only known up to where the tile is judged.
+        loop {
+            let Some(samples) = film.lock().missing_of_tile(number, part.samples.clone()).into_iter().next() else {
+                return Ok(());
+            };
             let samples = samples.start as u32..samples.end as u32;
             let (sums, counters) = render_tile(job, tile, samples.clone(), progress)?;
             // Once a tile.
@@ -175,7 +179,6 @@ pub(crate) fn add_part<'a>(
             let area = u64::from(tile.x1 - tile.x0) * u64::from(tile.y1 - tile.y0);
             progress.work_done(area * u64::from(samples.end - samples.start));
         }
-        Ok(())
     })
 }
 
@@ -189,7 +192,7 @@ fn render_tile<'a>(
     let mut counters = Counters::default();
     let area = (tile.x1 - tile.x0) as usize * (tile.y1 - tile.y0) as usize;
     let mut sums = TileSums::new();
-    let layers = job.options().layers;
+    let layers = job.options().kept_layers();
     if layers.is_empty() {
         for pixel in pixels(tile) {
             let sum = sum_pixel(&tracer, pixel, samples.clone(), progress, &mut counters, |value, _, _, _| value)?;

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use vdf_visibility::Counters;
 
-use crate::Job;
+use crate::{Job, SegmentSamples};
 
 /// All figures of one render. Times in seconds, sizes in bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -31,7 +31,7 @@ pub struct Statistics {
     /// Integrator.
     pub integrator: &'static str,
     /// Samples on each path segment, for `raymarch`.
-    pub samples_per_segment: Option<u32>,
+    pub samples_per_segment: Option<SegmentSamples>,
     /// Estimator of transmittance towards emitters.
     pub transmittance: &'static str,
     /// When paths were ended by chance.
@@ -42,8 +42,10 @@ pub struct Statistics {
     pub sampler: &'static str,
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
-    /// Samples per pixel.
+    /// Samples per pixel; the most that any has, where they differ.
     pub spp: u32,
+    /// How far a limit of noise was reached.
+    pub noise: Option<NoiseFigures>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Number of threads.
@@ -92,6 +94,21 @@ pub struct Statistics {
     pub fallbacks: Vec<Option<&'static str>>,
     /// Samples left out because they were not finite or negative; must be 0.
     pub refused: u64,
+}
+
+/// How far a limit of noise was reached.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NoiseFigures {
+    /// The limit.
+    pub limit: f64,
+    /// The noise of the whole picture, judged as one tile; `None` with fewer than two samples.
+    pub noise: Option<f64>,
+    /// Tiles of 16 × 16 pixels.
+    pub tiles: usize,
+    /// Those whose noise is below the limit.
+    pub quiet_tiles: usize,
+    /// Mean number of samples of a pixel.
+    pub mean_spp: f64,
 }
 
 /// The size of a light's safe neighbourhood.
@@ -154,6 +171,7 @@ impl Statistics {
             sampler: options.sampler.name(),
             size: job.size(),
             spp,
+            noise: None,
             seed: job.seed(),
             threads: rayon::current_num_threads(),
             triangles: prepared.world().triangles.len(),
@@ -242,6 +260,13 @@ impl fmt::Display for Statistics {
             ", {} transmittance, {} estimator, {} sampler, {} threads",
             self.transmittance, self.estimator, self.sampler, self.threads
         )?;
+        if let Some(NoiseFigures { limit, noise, tiles, quiet_tiles, mean_spp }) = self.noise {
+            let noise = noise.map_or_else(|| "unknown".to_owned(), |noise| format!("{noise:.4}"));
+            writeln!(
+                f,
+                "noise          {noise}, {quiet_tiles} of {tiles} tiles at most {limit}, {mean_spp:.1} samples per pixel in the mean"
+            )?;
+        }
         write!(f, "method         {}", self.method)?;
         if let (Some([x, y, z]), Some(size)) = (self.grid, self.voxel_size) {
             write!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vdf_render::Integrator;
+use vdf_render::{Integrator, SegmentSamples};
 
 use super::{Methods, ReportFiles, integrator_parser, parse_define, report::about};
 
@@ -39,8 +39,8 @@ pub(crate) struct ReportConvergenceArgs {
     #[arg(long, value_name = "INTEGRATOR", default_value = "volpath,raymarch", value_delimiter = ',', value_parser = integrator_parser())]
     pub(crate) integrator: Vec<Integrator>,
     /// Samples on each path segment, for raymarch only; several are separated by commas [default: 7]
-    #[arg(long, value_name = "N", value_delimiter = ',')]
-    pub(crate) samples_per_segment: Vec<u32>,
+    #[arg(long, value_name = "auto|N", value_delimiter = ',')]
+    pub(crate) samples_per_segment: Vec<SegmentSamples>,
     /// The most samples per pixel; renders have 1, 2, 4, ... up to this [default: 32, or 8 with --quick]
     #[arg(long, value_name = "N")]
     pub(crate) max_spp: Option<u32>,

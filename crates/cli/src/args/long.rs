@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, ValueEnum};
-use vdf_render::FilmPart;
+use vdf_render::{FilmPart, NoiseLimit};
 
 use super::PictureArgs;
 
@@ -14,6 +14,10 @@ pub(crate) struct LongArgs {
     /// Render for at most so long, not counting what is built before; without --spp as many samples as fit
     #[arg(long, value_name = "TIME", value_parser = parse_time)]
     pub(crate) time_limit: Option<Duration>,
+    /// Render each tile of 16 x 16 pixels until the standard error of its pixels over their mean is at most this, such as 0.02; without
+    /// --spp with at most 16384 samples. Adds the layers variance and samples
+    #[arg(long, value_name = "LIMIT")]
+    pub(crate) noise: Option<NoiseLimit>,
     /// Keep what is rendered in this file, so that --resume can go on with it after a crash or an interrupt
     #[arg(long, value_name = "FILE")]
     pub(crate) checkpoint: Option<PathBuf>,

@@ -7,7 +7,7 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser as _},
 };
 use vdf_lab::report::{REPORTS, scaling::SweepKind, thesis::ThesisOptions};
-use vdf_render::Integrator;
+use vdf_render::{Integrator, SegmentSamples};
 
 use super::{Methods, ReportConvergenceArgs, integrator_parser, parse_count, parse_define};
 
@@ -73,8 +73,8 @@ pub(crate) struct ReportQueriesArgs {
     #[arg(long, value_name = "INTEGRATOR", default_value = "volpath", value_parser = integrator_parser())]
     pub(crate) integrator: Integrator,
     /// Samples on each path segment, for raymarch only [default: 7]
-    #[arg(long, value_name = "N")]
-    pub(crate) samples_per_segment: Option<u32>,
+    #[arg(long, value_name = "auto|N")]
+    pub(crate) samples_per_segment: Option<SegmentSamples>,
     /// Samples per pixel of the render that is recorded [default: the scene's]
     #[arg(long, value_name = "N")]
     pub(crate) spp: Option<u32>,

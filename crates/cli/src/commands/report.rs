@@ -15,7 +15,7 @@ use vdf_lab::{
         thesis::{self, ThesisOptions},
     },
 };
-use vdf_render::{Integrator, PrepareOptions, PreparedScene, RenderOptions};
+use vdf_render::{Integrator, PrepareOptions, PreparedScene, RenderOptions, SegmentSamples};
 use vdf_visibility::Method;
 
 use super::render::{Named, integrator, load};
@@ -145,7 +145,7 @@ fn methods(choices: &[Methods]) -> Vec<Method> {
 }
 
 /// The integrators that two options name together: each name with each number of samples, if it takes any.
-fn integrators(names: &[Integrator], all_samples: &[u32]) -> Result<Vec<Integrator>, Failure> {
+fn integrators(names: &[Integrator], all_samples: &[SegmentSamples]) -> Result<Vec<Integrator>, Failure> {
     // Samples that no integrator takes are a mistake.
     if names.iter().all(|name| name.samples_per_segment().is_none()) {
         names.first().map(|&name| integrator(name, all_samples.first().copied())).transpose()?;

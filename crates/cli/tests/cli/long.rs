@@ -288,6 +288,52 @@ fn layers_are_divided_like_the_picture() {
     sandbox.fails(&args("a.exr", &["--aov", "colour"]), 2, &["unknown layer; the layers are albedo, normal"]);
 }
 
+/// Tiles stop at their own noise, whatever the render is divided into.
+#[test]
+fn noise_ends_tiles_one_by_one() {
+    let sandbox = Sandbox::new();
+    // An estimator without fireflies, or no tile would ever stop.
+    let way = ["--estimator", "equiangular", "--integrator", "raymarch", "--samples-per-segment", "2"];
+    let noise = [&["--noise", "0.15"][..], &way].concat();
+    let run = |out: &str, spp: &str, more: &[&str]| sandbox.run(&of_spp(spp, out, &[&noise[..], more].concat()));
+    run("whole.exr", "64", &["--stats", "a.json"]).succeeded();
+    let json: serde_json::Value = serde_json::from_slice(&sandbox.read("a.json")).unwrap();
+    let (tiles, quiet) = (json["noise"]["tiles"].as_u64().unwrap(), json["noise"]["quiet_tiles"].as_u64().unwrap());
+    let mean = json["noise"]["mean_spp"].as_f64().unwrap();
+    assert!(tiles == 6 && quiet > 0 && mean < 64.0 && mean >= 16.0, "{json}");
+    assert_eq!(json["paths"].as_f64().unwrap(), mean * 40.0 * 24.0);
+    run("other.exr", "64", &["--method", "none", "-j", "1"]).succeeded();
+    same(&sandbox, "other");
+    // Gone on with from fewer samples, and from a limit that was higher.
+    let keep = ["--checkpoint", "a.film", "--resume"];
+    run("part.exr", "19", &keep).succeeded();
+    run("resumed.exr", "64", &keep).succeeded();
+    same(&sandbox, "resumed");
+    let loose = [&["--noise", "0.4", "--checkpoint", "b.film", "--resume"][..], &way].concat();
+    sandbox.run(&of_spp("64", "part.exr", &loose)).succeeded();
+    run("resumed.exr", "64", &["--checkpoint", "b.film", "--resume"]).succeeded();
+    same(&sandbox, "resumed");
+    let message =
+        "b.film was rendered with --noise 0.15, and can be gone on with only with the same or a lower one, not 0.4";
+    sandbox.fails(&of_spp("64", "part.exr", &loose), 2, &[message]);
+    let layers = [&["--aov", "variance,samples", "--checkpoint", "b.film", "--resume"][..], &way].concat();
+    sandbox.fails(&of_spp("64", "part.exr", &layers), 2, &["was rendered with --noise 0.15", "not none"]);
+    // The pixels can be shared out, samples cannot.
+    for (shard, film) in [("0/2", "0.film"), ("1/2", "1.film")] {
+        run(film, "64", &["--shard", shard, "--tiles"]).succeeded();
+    }
+    let merge = ["merge", "0.film", "1.film", "-o", "merged.exr", "--reproducible"];
+    sandbox.run(&merge).succeeded();
+    same(&sandbox, "merged");
+    sandbox
+        .run(&of_spp("64", "1.film", &[&["--noise", "0.4", "--shard", "1/2", "--tiles"][..], &way].concat()))
+        .succeeded();
+    sandbox.fails(&merge, 2, &["the limit of noise differs, 0.15 and 0.4"]);
+    let shard = of_spp("64", "0.film", &["--noise", "0.4", "--shard", "0/2"]);
+    sandbox.fails(&shard, 2, &["--noise with --shard", "--tiles"]);
+    sandbox.fails(&args("a.exr", &["--noise", "0"]), 2, &["must be a positive number, such as 0.02"]);
+}
+
 #[test]
 fn an_exr_is_stored_as_asked() {
     let sandbox = Sandbox::new();

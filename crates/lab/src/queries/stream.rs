@@ -11,7 +11,7 @@ use std::{
 use glam::DVec3;
 use vdf_geometry::Triangle;
 use vdf_image::write_atomically;
-use vdf_render::{Integrator, PreparedScene};
+use vdf_render::{Integrator, PreparedScene, SegmentSamples};
 use vdf_visibility::{QueryKind, ShadowQuery};
 
 use crate::LabError;
@@ -25,6 +25,8 @@ const QUERY: usize = 56;
 const SPATIAL: u32 = 1;
 const UNOCCLUDED: u32 = 2;
 const ON_LIGHT: u32 = 4;
+/// In place of a number of samples per segment.
+const AUTO: u32 = u32::MAX;
 
 /// Where the queries of a stream come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +92,12 @@ impl QueryStream {
                 out.write_all(&n.to_le_bytes())?;
             }
             out.write_all(&o.spp.to_le_bytes())?;
-            out.write_all(&o.integrator.samples_per_segment().unwrap_or(0).to_le_bytes())?;
+            let samples = match o.integrator.samples_per_segment() {
+                None => 0,
+                Some(SegmentSamples::Count(n)) => n,
+                Some(SegmentSamples::Auto) => AUTO,
+            };
+            out.write_all(&samples.to_le_bytes())?;
             out.write_all(&o.triangles.to_le_bytes())?;
             for n in [o.triangles_crc32, o.emitters, crc.finalize(), o.scene_crc32] {
                 out.write_all(&n.to_le_bytes())?;
@@ -198,6 +205,7 @@ fn decode(file: &mut impl Read, length: u64) -> Result<QueryStream, String> {
         spp: u32_at(48),
         integrator: match u32_at(52) {
             0 => Integrator::Volpath,
+            AUTO => Integrator::Raymarch(SegmentSamples::Auto),
             n => Integrator::raymarch(n),
         },
         triangles: u64_at(56),

@@ -142,6 +142,18 @@ impl Layers {
         kept
     }
 
+    /// Where the first sum of a layer is among those that a film keeps, if it keeps any for it.
+    pub(super) fn place_of(self, layer: Layer) -> Option<usize> {
+        let first = *layer.sums().first().filter(|_| self.contains(layer))?;
+        self.kept().iter().position(|&kept| kept == first)
+    }
+
+    /// With the layers of another set.
+    #[must_use]
+    pub const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
     /// How many sums of each pixel a film keeps.
     pub(super) fn count(self) -> usize {
         self.kept().len()

@@ -14,6 +14,7 @@
 mod blocks;
 mod file;
 mod layers;
+mod noise;
 mod origin;
 
 use std::{ops::Range, sync::Arc};
@@ -25,9 +26,11 @@ use vdf_visibility::Counters;
 use self::blocks::BlockId;
 pub(crate) use self::blocks::PixelSum;
 pub(crate) use self::layers::{Feature, LayerSums};
+pub(crate) use self::noise::layers_of_noise;
 pub use self::{
     file::FilmFileError,
     layers::{Layer, Layers, UnknownLayer},
+    noise::{NoNoiseLimit, NoiseLimit},
     origin::{FilmOrigin, FilmRun, Picture},
 };
 use crate::{FilmPart, RenderError};
@@ -240,6 +243,13 @@ impl Film {
         self
     }
 
+    /// Takes the film as a part of a render to another limit of noise. Of a render without one it has no sums that tell noise.
+    #[must_use]
+    pub fn of_noise(mut self, limit: NoiseLimit) -> Self {
+        self.origin.noise = self.origin.noise.map(|_| limit);
+        self
+    }
+
     /// How the queries of all samples were answered.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
@@ -252,10 +262,12 @@ impl Film {
         self.tiles.len()
     }
 
-    /// The parts of the samples `wanted` that tile `tile` has not yet.
+    /// The parts of the samples `wanted` that tile `tile` has not yet. With a limit of noise only those up to where the tile is judged next, and
+    /// none if it is quiet.
     #[must_use]
     pub fn missing_of_tile(&self, tile: usize, wanted: Range<u32>) -> Vec<Range<u64>> {
-        self.tiles[tile].missing(wanted.start.into()..wanted.end.into())
+        let tile = &self.tiles[tile];
+        tile.missing(self.before_next_look(tile, wanted.start.into()..wanted.end.into()))
     }
 
     /// The end of the samples that any tile has; 0 if none has any.
@@ -274,7 +286,7 @@ impl Film {
         ends.min().unwrap_or(part.samples.end)
     }
 
-    /// How many samples of `part` are not here: pixels times samples.
+    /// How many samples of `part` are not here: pixels times samples. With a limit of noise those that the next looks need, at least.
     #[must_use]
     pub fn missing_samples(&self, part: &FilmPart) -> u64 {
         let tiles = tile_rects(self.origin.crop).enumerate().filter(|(tile, _)| part.has_tile(*tile));
@@ -351,7 +363,7 @@ impl Film {
     /// The image: the mean of the samples of each pixel.
     ///
     /// # Errors
-    /// If the samples are not all those from 0 to some number, the same for all tiles; or if there is no memory.
+    /// If the samples are not all those from 0 to some number, the same for all tiles but those that are quiet; or if there is no memory.
     pub fn develop(&self) -> Result<Image, FilmError> {
         let missing = self.missing(0..u32::try_from(self.samples_end().max(1)).unwrap_or(u32::MAX));
         if missing.is_empty() { self.develop_so_far() } else { Err(FilmError::Missing { missing }) }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use vdf_scene::PixelRect;
 
-use super::{FilmError, Layers};
+use super::{FilmError, Layers, NoiseLimit};
 
 /// What the samples of a film are samples of: films that differ in it cannot be merged.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,6 +35,8 @@ pub struct FilmOrigin {
     pub method: Option<String>,
     /// Samples per pixel of the whole render.
     pub spp: u32,
+    /// At what noise a tile gets no more samples than it has.
+    pub noise: Option<NoiseLimit>,
 }
 
 impl FilmOrigin {
@@ -49,10 +51,12 @@ impl FilmOrigin {
     /// [`FilmError::Stranger`], which says what differs.
     pub fn check_same_render(&self, other: &Self) -> Result<(), FilmError> {
         self.check_same_samples(other)?;
-        differ("the number of samples per pixel of the whole render", &self.spp, &other.spp)
+        differ("the number of samples per pixel of the whole render", &self.spp, &other.spp)?;
+        let noise = |limit: Option<NoiseLimit>| limit.map_or_else(|| "none".to_owned(), |l| f64::from(l).to_string());
+        differ("the limit of noise", &noise(self.noise), &noise(other.noise))
     }
 
-    /// As [`FilmOrigin::check_same_render`], but the one may be a longer render than the other.
+    /// As [`FilmOrigin::check_same_render`], but the one may be a longer render than the other, or one to another noise.
     ///
     /// # Errors
     /// [`FilmError::Stranger`], which says what differs.
@@ -72,6 +76,7 @@ impl FilmOrigin {
             layers,
             method,
             spp: _,
+            noise: _,
         } = self;
         differ("the program's version", version, &other.version)?;
         differ("the scene (its checksum)", &format!("{scene:08x}"), &format!("{:08x}", other.scene))?;

@@ -24,6 +24,7 @@ fn origin(seed: u64) -> FilmOrigin {
         layers: Layers::default(),
         method: None,
         spp: 70,
+        noise: None,
     }
 }
 

@@ -13,7 +13,7 @@ use vdf_geometry::{Hit, Segment};
 use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
-pub use self::kind::{Integrator, UnknownIntegrator};
+pub use self::kind::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 use crate::{
     Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler, TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
@@ -126,7 +126,7 @@ impl<R: Recorder> Tracer<'_, R> {
                 Estimator::Thesis => self.volpath(ray, sampler, counters),
                 Estimator::Equiangular | Estimator::Lit => self.volpath_by_mixture(ray, sampler, counters),
             },
-            Integrator::Raymarch { samples_per_segment } => self.raymarch(ray, samples_per_segment, sampler, counters),
+            Integrator::Raymarch(samples) => self.raymarch(ray, samples, sampler, counters),
         }
     }
 

@@ -24,7 +24,7 @@ use super::{
     to_f32,
 };
 use crate::{
-    Estimator, Sampler,
+    Estimator, Sampler, SegmentSamples,
     media::{FreeFlight, MediumIntervals},
 };
 
@@ -45,8 +45,14 @@ pub(super) struct Fog<'a> {
 }
 
 impl<R: Recorder> Tracer<'_, R> {
-    /// Radiance along `ray` by ray marching with `samples` strata a segment (at least 1).
-    pub(crate) fn raymarch(&self, ray: PathRay, samples: u32, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+    /// Radiance along `ray` by ray marching with so many strata a segment.
+    pub(crate) fn raymarch(
+        &self,
+        ray: PathRay,
+        samples: SegmentSamples,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
         let lights = &self.world.lights;
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
@@ -54,6 +60,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let intervals = self.world.media.intervals(&free, &path.ray.regions);
             let tau = intervals.optical_depth();
             if tau > 0.0 && self.may_scatter(path.depth + 1) {
+                let samples = samples.of_share(f64::from(path.throughput.max_element()) * -(-tau).exp_m1());
                 let fog = Fog { free: &free, direction: path.ray.direction, intervals: &intervals, tau, samples };
                 let light = match self.estimator {
                     Estimator::Thesis => self.by_transmittance(&fog, sampler, counters),

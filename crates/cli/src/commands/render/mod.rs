@@ -15,7 +15,7 @@ use anyhow::{Context as _, anyhow};
 use vdf_image::{StagedFile, check_distinct, shown};
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Estimator, Film, Integrator, PrepareOptions, PreparedScene, RenderOptions, Roulette, SamplerKind,
+    Estimator, Film, Integrator, PrepareOptions, PreparedScene, RenderOptions, Roulette, SamplerKind, SegmentSamples,
     TransmittanceEstimator, thread_count,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
@@ -33,6 +33,8 @@ use crate::{
 
 /// So many samples per pixel are more than a limit of time lets anyone take.
 const MOST_SAMPLES: u32 = 1 << 30;
+/// Where only noise limits a render: beside a point light there may be pixels whose noise never ends.
+const MOST_SAMPLES_FOR_NOISE: u32 = 1 << 14;
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if args.long.progress == ProgressName::Json {
@@ -49,6 +51,8 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     let mut options = options(args)?;
     if args.long.time_limit.is_some() {
         options.spp = Some(options.spp.unwrap_or(MOST_SAMPLES));
+    } else if options.noise.is_some() {
+        options.spp = Some(options.spp.unwrap_or(MOST_SAMPLES_FOR_NOISE));
     }
     let prepare = PrepareOptions {
         // Proofs of flights need a field, whatever the lights.
@@ -60,6 +64,11 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
         ..PrepareOptions::default()
     };
     prepare.validate()?;
+    if args.long.noise.is_some() && args.long.shard.is_some() && !args.long.tiles {
+        return Err(Failure::Usage(anyhow!(
+            "--noise with --shard: shards of samples cannot know the noise of the whole; divide the pixels with --tiles"
+        )));
+    }
     let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
     options.validate(&named.scene)?;
     let output = output(args, &named)?;
@@ -201,7 +210,10 @@ pub(super) fn write_stream(path: &Path, stream: &QueryStream) -> Result<(), Fail
 }
 
 /// The integrator with its samples per segment, if it takes any.
-pub(super) fn integrator(integrator: Integrator, samples_per_segment: Option<u32>) -> Result<Integrator, Failure> {
+pub(super) fn integrator(
+    integrator: Integrator,
+    samples_per_segment: Option<SegmentSamples>,
+) -> Result<Integrator, Failure> {
     let Some(n) = samples_per_segment else { return Ok(integrator) };
     integrator
         .with_samples_per_segment(n)
@@ -237,6 +249,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
         crop: args.crop,
         segment_first: args.segment_first,
         layers: args.aov.iter().copied().collect(),
+        noise: args.long.noise,
     })
 }
 

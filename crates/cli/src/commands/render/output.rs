@@ -7,7 +7,7 @@ use serde::Serialize;
 use vdf_image::{
     AttributeValue, ComponentFormat, ExrOptions, Image, StagedFile, check_writable, shown, stage_exr_layers, stage_png,
 };
-use vdf_render::{Film, Integrator};
+use vdf_render::{Film, Integrator, SegmentSamples};
 
 use crate::{args::PictureArgs, failure::Failure};
 
@@ -97,7 +97,14 @@ fn attributes(film: &Film, reproducible: bool) -> Vec<(&'static str, AttributeVa
         ("vdf.seed", o.seed.to_string().into()),
     ];
     let samples_per_segment = integrator.and_then(Integrator::samples_per_segment);
-    attributes.extend(samples_per_segment.map(|n| ("vdf.samplesPerSegment", i64::from(n).into())));
+    attributes.extend(samples_per_segment.map(|samples| {
+        let value = match samples {
+            SegmentSamples::Count(n) => i64::from(n).into(),
+            SegmentSamples::Auto => "auto".into(),
+        };
+        ("vdf.samplesPerSegment", value)
+    }));
+    attributes.extend(o.noise.map(|limit| ("vdf.noiseLimit", f64::from(limit).into())));
     if reproducible {
         return attributes;
     }

@@ -12,7 +12,7 @@ use std::{
 
 use anyhow::anyhow;
 use vdf_image::{Image, shown};
-use vdf_render::{Film, FilmPart, LiveFilm, PreparedScene, Progress, RenderError, RenderOptions};
+use vdf_render::{Film, FilmPart, LiveFilm, NoiseLimit, PreparedScene, Progress, RenderError, RenderOptions};
 
 use super::display::Display;
 use crate::{
@@ -41,7 +41,7 @@ pub(super) struct Checkpoint {
     pub(super) every: Duration,
 }
 
-/// What has been rendered: a film whose tiles all have the same samples, those of the part up to `end`.
+/// What has been rendered: a film whose tiles all have the samples of the part up to `end`, but for those that are quiet.
 pub(super) struct Rendered {
     pub(super) film: Film,
     pub(super) end: u32,
@@ -104,7 +104,7 @@ pub(super) fn render(
     };
     let clock = Clock::start(plan, film.snapshot().runs().len());
     reporter.phase("rendering");
-    begin_progress(plan, &film.snapshot(), reporter);
+    tell_total(plan, &film.snapshot(), reporter);
     let outcome = thread::scope(|scope| {
         let keeper = scope.spawn(|| keep(&shared, &clock, checkpoint, asked, picture));
         let outcome = passes(plan, &shared, &clock);
@@ -146,8 +146,8 @@ fn write(film: &Film, path: &Path) -> Result<(), Failure> {
     film.write(path).map_err(|e| Failure::Work(e.into()))
 }
 
-/// How much there is to do, and is done before the first pass.
-fn begin_progress(plan: &Plan<'_>, film: &Film, reporter: &Reporter) {
+/// How much there is to do as far as that is known, and how much is done.
+fn tell_total(plan: &Plan<'_>, film: &Film, reporter: &Reporter) {
     match plan.time_limit {
         Some(limit) => reporter.limit(limit),
         None => {
@@ -180,7 +180,7 @@ impl<'a> Clock<'a> {
     }
 }
 
-/// Passes that double the samples, until the part is complete or the next one would take too long.
+/// Passes that double the samples, until the part is complete, all tiles are quiet, or the next pass would take too long.
 fn passes(plan: &Plan<'_>, shared: &Shared<'_>, clock: &Clock<'_>) -> Result<Rendered, Failure> {
     let Plan { prepared, options, part, .. } = plan;
     let (first, goal) = (part.samples.start, part.samples.end);
@@ -189,7 +189,10 @@ fn passes(plan: &Plan<'_>, shared: &Shared<'_>, clock: &Clock<'_>) -> Result<Ren
     let (began_at, mut picture) = (end, None);
     // In a film that is gone on with, some tiles may be ahead: the others have to follow before there is a picture.
     let ahead = u32::try_from(whole.samples_end()).unwrap_or(goal).min(goal);
-    while end < goal {
+    while end < goal && whole.missing_samples(part) > 0 {
+        if options.noise.is_some() && end > first {
+            tell_total(plan, &whole, shared.reporter);
+        }
         let done = end - first;
         let mut size = done.max(1).max(ahead.saturating_sub(end)).min(goal - end);
         if let (Some(limit), true) = (plan.time_limit, end > began_at && end >= ahead) {
@@ -225,17 +228,18 @@ fn passes(plan: &Plan<'_>, shared: &Shared<'_>, clock: &Clock<'_>) -> Result<Ren
     Ok(Rendered { film: whole, end })
 }
 
-/// Tells how many samples there are, and what error the image has, judged by what the last pass changed: if a is the mean of the first n
-/// samples and c that of all n + m, the variance of c is n/m times the expectation of (a − c)².
+/// Tells how many samples there are, and what error the image has. Where no variances are kept it is judged by what the last pass changed: if a is
+/// the mean of the first n samples and c that of all n + m, the variance of c is n/m times the expectation of (a − c)².
 fn tell_error(shared: &Shared<'_>, film: &Film, before: Option<Image>, n: f64, m: f64, spp: u32) -> Option<Image> {
     let after = film.develop_so_far().ok()?;
-    let error = before.filter(|_| n > 0.0).and_then(|before| {
+    let by_change = |before: Image| {
         let square = |p: vdf_image::Rgb| p.as_dvec3().length_squared();
         let changes: f64 = before.pixels.iter().zip(&after.pixels).map(|(a, c)| square(*a - *c)).sum();
         let sum: f64 = after.pixels.iter().map(|p| f64::from(p.element_sum())).sum();
         let numbers = 3.0 * after.pixels.len() as f64;
         (sum > 0.0).then(|| (changes * n / m / numbers).sqrt() / (sum / numbers))
-    });
+    };
+    let error = film.noise().or_else(|| before.filter(|_| n > 0.0).and_then(by_change));
     shared.reporter.pass(spp, error);
     Some(after)
 }
@@ -299,5 +303,17 @@ pub(super) fn begin(empty: Film, checkpoint: Option<(&Path, bool)>) -> Result<Fi
             "--resume: {name} has samples up to {have}, which cannot be taken back to {spp}; give --spp {have} or more"
         )));
     }
-    Ok(film.of_spp(spp))
+    match (film.origin().noise, empty.origin().noise) {
+        (None, None) => Ok(film.of_spp(spp)),
+        // Whatever went on at the one limit went on at the other.
+        (Some(had), Some(limit)) if limit <= had => Ok(film.of_spp(spp).of_noise(limit)),
+        (had, limit) => {
+            let told = |l: Option<NoiseLimit>| l.map_or_else(|| "none".to_owned(), |l| f64::from(l).to_string());
+            Err(Failure::Usage(anyhow!(
+                "--resume: {name} was rendered with --noise {}, and can be gone on with only with the same or a lower one, not {}",
+                told(had),
+                told(limit)
+            )))
+        }
+    }
 }

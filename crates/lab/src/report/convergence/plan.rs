@@ -2,7 +2,7 @@
 
 use std::{iter, path::PathBuf};
 
-use vdf_render::{GridExtent, Integrator, check_threads, check_voxel_size};
+use vdf_render::{GridExtent, Integrator, SegmentSamples, check_threads, check_voxel_size};
 use vdf_scene::{FilmSettings, PixelRect};
 use vdf_visibility::Method;
 
@@ -96,7 +96,7 @@ impl ConvergenceOptions {
         if self.integrators.is_empty() {
             return Err(LabError::option("integrator", "must name at least one"));
         }
-        if self.integrators.iter().any(|i| i.samples_per_segment() == Some(0)) {
+        if self.integrators.iter().any(|i| i.samples_per_segment() == Some(SegmentSamples::Count(0))) {
             return Err(LabError::option("samples-per-segment", "must be at least 1"));
         }
         check_threads(self.threads)?;
