@@ -26,8 +26,7 @@ fn bench(c: &mut Criterion) {
             let mut expected = None;
             for method in METHODS {
                 let prepared = bench.with(method.parse::<Method>().expect("a method"));
-                let options =
-                    RenderOptions { integrator, spp: Some(SPP), threads: Some(1), ..RenderOptions::default() };
+                let options = RenderOptions { integrator, spp: Some(SPP), threads: Some(1), ..RenderOptions::thesis() };
                 let image = || prepared.render(&options, &Quiet).expect("usable options").image.pixels;
                 assert_eq!(expected.get_or_insert_with(image), &image(), "{method} changes the image");
                 group.bench_function(BenchmarkId::from_parameter(method), |b| b.iter(image));

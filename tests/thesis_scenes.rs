@@ -76,7 +76,7 @@ fn the_boxes_meet_the_tables() {
                 spp: Some(4),
                 seed: Some(0),
                 threads: Some(2),
-                ..RenderOptions::default()
+                ..RenderOptions::thesis()
             };
             let prepared = PreparedScene::new(scene.clone(), &prepare, &Quiet).expect("a sound scene");
             let s = prepared.render(&render, &Quiet).expect("it renders").statistics;

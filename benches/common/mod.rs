@@ -41,7 +41,7 @@ impl Bench {
 
     /// The queries of about as many paths as ask `most`, in the order of the render.
     pub(crate) fn record(&self, integrator: Integrator, most: u64) -> Vec<ShadowQuery> {
-        let options = RenderOptions { integrator, spp: Some(1), ..RenderOptions::default() };
+        let options = RenderOptions { integrator, spp: Some(1), ..RenderOptions::thesis() };
         record_queries(&self.none, &options, most, &Quiet).expect("usable options").queries
     }
 

@@ -17,12 +17,12 @@ fn mean_and_standard_error(values: &[f64]) -> (f64, f64) {
 
 /// The mean of all pixels of one tile over many seeds, rendered to a limit and with a fixed number of samples, and their standard errors, all over
 /// the latter.
-fn bias(scene: &str, limit: f64, most: u32, seeds: u64) -> (f64, f64, f64) {
+fn bias(scene: &str, way: &RenderOptions, limit: f64, most: u32, seeds: u64) -> (f64, f64, f64) {
     let scene = builtin(scene, &[("width", "64"), ("height", "64")]);
     let prepared = PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).unwrap();
     let mean = |noise: Option<NoiseLimit>, spp: u32, seed: u64| {
         let crop = Some(PixelRect { x0: 28, y0: 28, x1: 36, y1: 36 });
-        let options = RenderOptions { spp: Some(spp), seed: Some(seed), crop, noise, ..RenderOptions::default() };
+        let options = RenderOptions { spp: Some(spp), seed: Some(seed), crop, noise, ..way.clone() };
         let image = prepared.render(&options, &Quiet).unwrap().image;
         image.pixels.iter().map(|p| f64::from(p.element_sum())).sum::<f64>()
     };
@@ -35,8 +35,8 @@ fn bias(scene: &str, limit: f64, most: u32, seeds: u64) -> (f64, f64, f64) {
 /// Five standard errors, a false alarm of 6·10⁻⁷ a case, and a bias of a 20th of the limit: what is documented.
 #[test]
 fn stopping_by_noise_moves_the_mean_by_little() {
-    for (scene, limit) in [("cbox_vol2", 0.2), ("cbox_vol4", 0.3)] {
-        let (bias, error, _) = bias(scene, limit, 1024, 100);
+    for (scene, limit) in [("cbox_vol2", 0.2), ("cbox_vol4", 0.2)] {
+        let (bias, error, _) = bias(scene, &RenderOptions::default(), limit, 256, 60);
         println!("{scene}, noise {limit}: the mean is off by {:.2} ± {:.2} %", 100.0 * bias, 100.0 * error);
         assert!(bias.abs() < limit / 20.0 + 5.0 * error, "{scene}: {bias} ± {error}");
         assert!(error < limit / 20.0, "too noisy to tell: {error}");
@@ -47,12 +47,21 @@ fn stopping_by_noise_moves_the_mean_by_little() {
 #[test]
 #[ignore = "minutes: for the table in docs/accuracy.md"]
 fn bias_of_stopping_by_noise() {
-    println!("| scene | limit | bias of the mean, % | standard deviation of a tile's mean, % |");
-    println!("| --- | --- | --- | --- |");
-    for scene in ["cbox_vol2", "cbox_vol4", "cbox_light", "scape"] {
-        for limit in [0.4, 0.2, 0.1, 0.05] {
-            let (bias, error, spread) = bias(scene, limit, 1 << 14, 400);
-            println!("| `{scene}` | {limit} | {:.2} ± {:.2} | {:.2} |", 100.0 * bias, 100.0 * error, 100.0 * spread);
+    println!("| scene | limit | estimator, sampler | bias of the mean, % | standard deviation of a tile's mean, % |");
+    println!("| --- | --- | --- | --- | --- |");
+    for (scene, limits) in [
+        ("cbox_vol2", &[0.4, 0.2, 0.1][..]),
+        ("cbox_vol4", &[0.4, 0.2]),
+        ("cbox_light", &[0.4, 0.2]),
+        ("scape", &[0.2, 0.1]),
+    ] {
+        for (&limit, way) in
+            limits.iter().flat_map(|limit| [RenderOptions::default(), RenderOptions::thesis()].map(|way| (limit, way)))
+        {
+            let names = format!("{}, {}", way.estimator.name(), way.sampler.name());
+            let (bias, error, spread) = bias(scene, &way, limit, 1 << 12, 200);
+            let [bias, error, spread] = [bias, error, spread].map(|x| 100.0 * x);
+            println!("| `{scene}` | {limit} | {names} | {bias:.2} ± {error:.2} | {spread:.2} |");
         }
     }
 }

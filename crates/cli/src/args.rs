@@ -86,11 +86,11 @@ pub(crate) struct RenderArgs {
     /// When paths are ended by chance: as in Mitsuba 3, or earlier, as in the thesis's renderer; the mean is the same
     #[arg(long, value_enum, default_value_t = RouletteName::Standard)]
     pub(crate) roulette: RouletteName,
-    /// How light is looked for: as in the thesis, or with distances and directions drawn towards point lights, too, for less noise; "lit" looks only where a ray is lit; all of the same mean
-    #[arg(long, value_enum, default_value_t = EstimatorName::Thesis)]
+    /// How light is looked for: as in the thesis, or with distances and directions drawn towards point lights, too, which is less noisy; "lit" looks only where a ray is lit; all of the same mean
+    #[arg(long, value_enum, default_value_t = EstimatorName::Equiangular)]
     pub(crate) estimator: EstimatorName,
     /// How the samples of a pixel are spread: each for itself, or so that they fill it, which is less noisy
-    #[arg(long, value_enum, default_value_t = SamplerName::Independent)]
+    #[arg(long, value_enum, default_value_t = SamplerName::Sobol)]
     pub(crate) sampler: SamplerName,
     /// Ask for a proof of each free flight before a ray is cast for it (volpath); the image is the same
     #[arg(long)]

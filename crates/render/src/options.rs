@@ -37,10 +37,10 @@ const MOST_TEXELS: u32 = 8192;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {
     /// The thesis's own: distances by transmittance alone, emitters seen from wherever that leads (Sec. 2.3 and 2.5 in \[Houska2013\]).
-    #[default]
     Thesis,
     /// Distances are drawn by the angle that they subtend at a light \[Kulla2012\], too, and by `volpath` directions towards point lights: far less
     /// noise in thin fog and around lights.
+    #[default]
     Equiangular,
     /// By `raymarch` light of point emitters is gathered only where a ray is lit ([`vdf_visibility::LitIntervals`]); all else as `equiangular`, for
     /// paths gained nothing by it (`docs/performance.md`).
@@ -188,6 +188,12 @@ pub struct RenderOptions {
 }
 
 impl RenderOptions {
+    /// As the thesis renders: its estimator, each sample for itself. What is measured beside its figures, and beside earlier ones, is measured so.
+    #[must_use]
+    pub fn thesis() -> Self {
+        Self { estimator: Estimator::Thesis, sampler: SamplerKind::Independent, ..Self::default() }
+    }
+
     /// The layers that a film of this render keeps: those asked for, and `variance` and `samples` if there is a limit of noise.
     #[must_use]
     pub fn kept_layers(&self) -> Layers {

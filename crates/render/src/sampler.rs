@@ -12,10 +12,10 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SamplerKind {
     /// Each for itself.
-    #[default]
     Independent,
     /// By a Sobol sequence with Owen scrambling: together they fill the pixel, which is less noisy. Numbers of samples that are powers of two
     /// fill it best.
+    #[default]
     Sobol,
 }
 

@@ -51,7 +51,7 @@ fn run_queries(args: &ReportQueriesArgs) -> Result<(), Failure> {
         spp: args.spp,
         seed: args.seed,
         threads: args.threads,
-        ..RenderOptions::default()
+        ..RenderOptions::thesis()
     };
     let exported = ["triangles.bin", "queries.bin"].map(|name| args.export.as_ref().map(|folder| folder.join(name)));
     let others = exported.iter().flatten().map(|path| ("--export", path.as_path()));

@@ -25,7 +25,7 @@ fn plain(name: &str, size: &str) -> PreparedScene {
 }
 
 fn options(integrator: Integrator, threads: usize) -> RenderOptions {
-    RenderOptions { integrator, spp: Some(3), threads: Some(threads), ..RenderOptions::default() }
+    RenderOptions { integrator, spp: Some(3), threads: Some(threads), ..RenderOptions::thesis() }
 }
 
 const RAYMARCH: Integrator = Integrator::raymarch(5);

@@ -58,7 +58,7 @@ fn text_is_aligned_and_has_the_figures_of_the_thesis() {
 fn a_report_without_a_command_line() {
     let prepared = PreparedScene::new(lamp(), &PrepareOptions::with_method(Method::NONE), &Quiet).unwrap();
     let integrator = Integrator::raymarch(3);
-    let recorded = RenderOptions { integrator, spp: Some(2), ..RenderOptions::default() };
+    let recorded = RenderOptions { integrator, spp: Some(2), ..RenderOptions::thesis() };
     let stream = record_queries(&prepared, &recorded, 2000, &Quiet).unwrap();
     let options = ReplayOptions { methods: vec![Method::best_with_voxels()], passes: 1, ..ReplayOptions::default() };
     let report = queries::run("lamp", &prepared, &stream, &options, &Quiet).unwrap();

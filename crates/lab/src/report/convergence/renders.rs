@@ -81,7 +81,7 @@ impl Renders<'_> {
             spp: Some(spp),
             seed: Some(seed),
             threads: self.plan.threads,
-            ..RenderOptions::default()
+            ..RenderOptions::thesis()
         }
     }
 }

@@ -122,7 +122,7 @@ impl Lab<'_> {
             spp: Some(4),
             seed: Some(self.options.seed),
             threads,
-            ..RenderOptions::default()
+            ..RenderOptions::thesis()
         };
         let part = Part(self.progress);
         let stream = record_queries(alone, &options, self.options.queries, &part)?;
@@ -148,7 +148,7 @@ impl Lab<'_> {
             spp: Some(self.options.spp),
             seed: Some(self.options.seed),
             threads,
-            ..RenderOptions::default()
+            ..RenderOptions::thesis()
         };
         let mut results: Vec<(Vec<f64>, Option<Statistics>)> = built.iter().map(|_| (vec![], None)).collect();
         for _ in self.repetitions() {

@@ -79,7 +79,7 @@ impl Bench<'_> {
             threads: Some(1),
             roulette: Roulette::Thesis,
             segment_first: false,
-            ..RenderOptions::default()
+            ..RenderOptions::thesis()
         }
     }
 
