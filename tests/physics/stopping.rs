@@ -19,14 +19,15 @@ fn mean_and_standard_error(values: &[f64]) -> (f64, f64) {
 /// the latter.
 fn bias(scene: &str, way: &RenderOptions, limit: f64, most: u32, seeds: u64) -> (f64, f64, f64) {
     let scene = builtin(scene, &[("width", "64"), ("height", "64")]);
-    let prepared = PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).unwrap();
+    let prepared =
+        PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).expect("a sound scene");
     let mean = |noise: Option<NoiseLimit>, spp: u32, seed: u64| {
         let crop = Some(PixelRect { x0: 28, y0: 28, x1: 36, y1: 36 });
         let options = RenderOptions { spp: Some(spp), seed: Some(seed), crop, noise, ..way.clone() };
-        let image = prepared.render(&options, &Quiet).unwrap().image;
+        let image = prepared.render(&options, &Quiet).expect("usable options").image;
         image.pixels.iter().map(|p| f64::from(p.element_sum())).sum::<f64>()
     };
-    let stopped: Vec<f64> = (0..seeds).map(|seed| mean(Some(limit.try_into().unwrap()), most, seed)).collect();
+    let stopped: Vec<f64> = (0..seeds).map(|seed| mean(Some(limit.try_into().expect("a limit")), most, seed)).collect();
     let fixed: Vec<f64> = (0..seeds).map(|seed| mean(None, 64, seeds + seed)).collect();
     let ((a, error_a), (b, error_b)) = (mean_and_standard_error(&stopped), mean_and_standard_error(&fixed));
     (a / b - 1.0, error_a.hypot(error_b) / b, error_a * (seeds as f64).sqrt() / b)
@@ -36,7 +37,7 @@ fn bias(scene: &str, way: &RenderOptions, limit: f64, most: u32, seeds: u64) -> 
 #[test]
 fn stopping_by_noise_moves_the_mean_by_little() {
     for (scene, limit) in [("cbox_vol2", 0.2), ("cbox_vol4", 0.2)] {
-        let (bias, error, _) = bias(scene, &RenderOptions::default(), limit, 256, 60);
+        let (bias, error, _) = bias(scene, &RenderOptions::default(), limit, 256, 32);
         println!("{scene}, noise {limit}: the mean is off by {:.2} ± {:.2} %", 100.0 * bias, 100.0 * error);
         assert!(bias.abs() < limit / 20.0 + 5.0 * error, "{scene}: {bias} ± {error}");
         assert!(error < limit / 20.0, "too noisy to tell: {error}");

@@ -231,7 +231,10 @@ mod tests {
         let [volpath, raymarch] = [Integrator::Volpath, Integrator::raymarch(7)];
         assert_eq!(integrators(&[volpath, raymarch], &[]).unwrap(), [volpath, raymarch]);
         let [one, three] = [1, 3].map(Integrator::raymarch);
-        assert_eq!(integrators(&[raymarch, volpath], &[1, 3]).unwrap(), [one, three, volpath]);
-        assert!(matches!(integrators(&[volpath], &[3]), Err(Failure::Usage(_))));
+        assert_eq!(
+            integrators(&[raymarch, volpath], &[1, 3].map(SegmentSamples::Count)).unwrap(),
+            [one, three, volpath]
+        );
+        assert!(matches!(integrators(&[volpath], &[SegmentSamples::Count(3)]), Err(Failure::Usage(_))));
     }
 }
