@@ -11,7 +11,7 @@ use vdf_image::{
 };
 use vdf_render::on_threads;
 
-use crate::{dictionary, interrupt::interruptible, value_error};
+use crate::{arrays::array, dictionary, exception, interrupt::interruptible};
 
 /// The pixels as an array of (height, width, 3).
 pub(crate) fn pixels_to_array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
@@ -21,11 +21,10 @@ pub(crate) fn pixels_to_array(py: Python<'_>, image: Image) -> PyResult<Bound<'_
 }
 
 /// An image of an array of (height, width, 3).
-fn image_of_array(array: &PyReadonlyArray3<'_, f32>) -> PyResult<Image> {
-    let wrong = || PyValueError::new_err("an image is an array of float32 of shape (height, width, 3)");
-    let &[height, width, 3] = array.shape() else { return Err(wrong()) };
-    let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else { return Err(wrong()) };
-    let mut image = Image::try_new(width, height).map_err(|e| value_error(&e))?;
+fn image_of_array(what: &str, given: &Bound<'_, PyAny>) -> PyResult<Image> {
+    let array: PyReadonlyArray3<'_, f32> = array(what, "(height, width, 3)", &[3], given)?;
+    let [height, width] = [0, 1].map(|axis| u32::try_from(array.shape()[axis]));
+    let mut image = Image::try_new(width?, height?).map_err(|e| exception(&e))?;
     let view = array.as_array();
     for (pixel, rgb) in image.pixels.iter_mut().zip(view.rows()) {
         *pixel = Rgb::new(rgb[0], rgb[1], rgb[2]);
@@ -33,42 +32,60 @@ fn image_of_array(array: &PyReadonlyArray3<'_, f32>) -> PyResult<Image> {
     Ok(image)
 }
 
+/// The figures of ``vdf compare --json`` for two images, float32 of shape (height, width, 3): ``mse``, ``mae``, ``relmse``, ``psnr``
+/// (None if they are identical), ``ssim``, ``flip_ldr``, ``flip_hdr``, ``identical``.
+///
+/// Raises ValueError if they differ in size, or a pixel is not finite.
 #[pyfunction]
 #[pyo3(signature = (image, reference, *, pixels_per_degree = PIXELS_PER_DEGREE))]
 pub(crate) fn compare<'py>(
     py: Python<'py>,
-    image: PyReadonlyArray3<'py, f32>,
-    reference: PyReadonlyArray3<'py, f32>,
+    image: &Bound<'py, PyAny>,
+    reference: &Bound<'py, PyAny>,
     pixels_per_degree: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (a, b) = (image_of_array(&image)?, image_of_array(&reference)?);
+    let (a, b) = (image_of_array("image", image)?, image_of_array("reference", reference)?);
     let compared = interruptible(py, |_| {
         on_threads(None, || {
             Ok::<_, vdf_render::RenderError>(metrics::compare(&a, &b, DynamicRange::High, pixels_per_degree))
         })
     })?;
-    dictionary(py, &compared.map_err(|e| value_error(&e))?.map_err(|e| value_error(&e))?)
+    dictionary(py, &compared.map_err(|e| exception(&e))?.map_err(|e| exception(&e))?)
 }
 
+/// The channels R, G and B of an EXR, float32 of shape (height, width, 3).
+///
+/// Raises OSError if the file cannot be read, and ValueError if it is no such EXR.
 #[pyfunction]
 pub(crate) fn read_exr(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyArray3<f32>>> {
-    let image = py.detach(|| vdf_image::read_exr(&path)).map_err(|e| value_error(&e))?;
+    let image = py.detach(|| vdf_image::read_exr(&path)).map_err(|e| exception(&e))?;
     pixels_to_array(py, image)
 }
 
+/// Write an image, float32 of shape (height, width, 3), as an EXR, with layers of shape (height, width, channels) as
+/// ``Rendering.layers`` has them, or of your own. The file appears whole or not at all.
+///
+/// Raises OSError if the file cannot be written.
 #[pyfunction]
 #[pyo3(signature = (path, image, *, layers = None))]
 pub(crate) fn write_exr(
     py: Python<'_>,
     path: PathBuf,
-    image: PyReadonlyArray3<'_, f32>,
+    image: &Bound<'_, PyAny>,
     layers: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<()> {
-    let image = image_of_array(&image)?;
+    let image = image_of_array("image", image)?;
     let mut channels = Vec::new();
-    for (name, array) in layers.into_iter().flatten() {
-        let (name, array): (String, PyReadonlyArray3<'_, f32>) = (name.extract()?, array.extract()?);
-        let count = array.shape()[2];
+    for (name, given) in layers.into_iter().flatten() {
+        let name: String = name.extract()?;
+        let what = format!("layer {name}");
+        let array: PyReadonlyArray3<'_, f32> = array(&what, "(height, width, channels)", &[], &given)?;
+        let &[height, width, count] = array.shape() else { continue };
+        if [width, height] != [image.width as usize, image.height as usize] {
+            let message =
+                format!("{what} has {width} x {height} pixels, and the image {} x {}", image.width, image.height);
+            return Err(PyValueError::new_err(message));
+        }
         let known = name.parse().map(vdf_render::Layer::channels).ok().filter(|names| names.len() == count);
         for i in 0..count {
             let channel = known.map_or_else(|| i.to_string(), |names| names[i].to_owned());
@@ -80,6 +97,6 @@ pub(crate) fn write_exr(
 }
 
 fn write(path: &Path, image: &Image, channels: &[Channel]) -> PyResult<()> {
-    let file = stage_exr_layers(path, image, channels, &[], &ExrOptions::default()).map_err(|e| value_error(&e))?;
-    file.persist().map_err(|e| value_error(&e))
+    let file = stage_exr_layers(path, image, channels, &[], &ExrOptions::default()).map_err(|e| exception(&e))?;
+    file.persist().map_err(|e| exception(&e))
 }

@@ -1,5 +1,7 @@
-//! vdf for Python: the module `vdf._vdf`, which `vdf` re-exports. What is public, with shapes and units, is documented in `vdf/__init__.pyi`.
+//! vdf for Python: the module `vdf._vdf`, which `vdf` re-exports. The docstrings are for Python; those of the stubs, `vdf/__init__.pyi`, are the same,
+//! which a test checks.
 
+mod arrays;
 mod images;
 mod interrupt;
 mod scene;
@@ -8,19 +10,23 @@ mod visibility;
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use serde::Serialize;
 
-/// The message of an error with those of its causes.
-fn value_error(error: &dyn std::error::Error) -> PyErr {
-    let (mut message, mut source) = (error.to_string(), error.source());
+/// The message of an error with those of its causes: OSError or one of its kinds if the system refused something, else ValueError.
+fn exception(error: &(dyn std::error::Error + 'static)) -> PyErr {
+    let (mut message, mut source, mut system) = (error.to_string(), error.source(), None);
     while let Some(cause) = source {
         message = format!("{message}: {cause}");
+        system = system.or(cause.downcast_ref::<std::io::Error>().map(std::io::Error::kind));
         source = cause.source();
     }
-    PyValueError::new_err(message)
+    match system {
+        Some(kind) => std::io::Error::new(kind, message).into(),
+        None => PyValueError::new_err(message),
+    }
 }
 
 /// Figures as a dictionary.
 fn dictionary<'py>(py: Python<'py>, figures: &impl Serialize) -> PyResult<Bound<'py, PyDict>> {
-    let json = serde_json::to_string(figures).map_err(|e| value_error(&e))?;
+    let json = serde_json::to_string(figures).map_err(|e| exception(&e))?;
     Ok(py.import("json")?.call_method1("loads", (json,))?.cast_into()?)
 }
 

@@ -8,7 +8,7 @@ use std::{
 
 use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::{
-    exceptions::PyValueError,
+    exceptions::{PyFileNotFoundError, PyValueError},
     prelude::*,
     types::{PyBool, PyDict},
 };
@@ -21,8 +21,9 @@ use vdf_scene::{LoadOptions, PixelRect, Scene, SceneSource};
 use vdf_scenes::builtin;
 use vdf_visibility::Method;
 
-use crate::{dictionary, images::pixels_to_array, interrupt::interruptible, value_error};
+use crate::{dictionary, exception, images::pixels_to_array, interrupt::interruptible};
 
+/// A scene. What a render builds is kept: the next one with the same method builds nothing.
 #[pyclass(name = "Scene", module = "vdf", frozen)]
 pub(crate) struct PyScene {
     scene: Arc<Scene>,
@@ -31,12 +32,16 @@ pub(crate) struct PyScene {
     prepared: Mutex<Option<(PrepareOptions, Arc<PreparedScene>)>>,
 }
 
+/// A finished render.
 #[pyclass(name = "Rendering", module = "vdf", frozen)]
 pub(crate) struct PyRendering {
+    /// Linear RGB with the primaries of sRGB, float32 of shape (height, width, 3), top row first.
     #[pyo3(get)]
     image: Py<PyAny>,
+    /// The layers asked for, each float32 of shape (height, width, channels), as docs/layers.md describes them.
     #[pyo3(get)]
     layers: Py<PyDict>,
+    /// The figures of ``vdf render --stats``: times in seconds, sizes in bytes, counts of queries.
     #[pyo3(get)]
     statistics: Py<PyDict>,
 }
@@ -49,6 +54,13 @@ fn parameter(value: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(value.str()?.to_string())
 }
 
+/// Load a scene file (a subset of Mitsuba 3 XML), or a built-in scene by its name.
+///
+/// Keyword arguments are the scene's ``$`` parameters, as ``-D`` on the command line: ``load("cbox_vol2", width=64)``.
+/// ``sensor`` is the number of the camera in the file, from 0.
+///
+/// Raises FileNotFoundError if there is neither such a file nor such a scene, and ValueError with file, line and column if the
+/// scene is not understood.
 #[pyfunction]
 #[pyo3(signature = (path, *, sensor = None, **params))]
 pub(crate) fn load(
@@ -63,7 +75,7 @@ pub(crate) fn load(
     }
     let options = LoadOptions { defines, sensor };
     let scene = py.detach(|| source(&path).map(|source| Scene::from_source(&source, &options)))?;
-    let scene = scene.map_err(|e| value_error(&e))?;
+    let scene = scene.map_err(|e| exception(&e))?;
     let name = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     Ok(PyScene { scene: Arc::new(scene), name, prepared: Mutex::new(None) })
 }
@@ -75,7 +87,7 @@ fn source(path: &Path) -> PyResult<SceneSource> {
     }
     path.to_str()
         .and_then(builtin)
-        .ok_or_else(|| PyValueError::new_err(format!("{}: no such file, nor a built-in scene", path.display())))
+        .ok_or_else(|| PyFileNotFoundError::new_err(format!("{}: no such file, nor a built-in scene", path.display())))
 }
 
 /// One of several by its name.
@@ -86,37 +98,43 @@ fn named<T: Copy>(what: &str, name: &str, all: &[T], of: fn(T) -> &'static str) 
     })
 }
 
-fn parsed<T: FromStr<Err: std::error::Error>>(name: &str) -> PyResult<T> {
-    name.parse().map_err(|e: T::Err| value_error(&e))
+fn parsed<T: FromStr<Err: std::error::Error + 'static>>(name: &str) -> PyResult<T> {
+    name.parse().map_err(|e: T::Err| exception(&e))
 }
 
 #[pymethods]
 impl PyScene {
+    /// The file's name without its extension, or that of the built-in scene.
     #[getter]
     fn name(&self) -> &str {
         &self.name
     }
 
+    /// Width and height of the full film in pixels.
     #[getter]
     fn size(&self) -> (u32, u32) {
         (self.scene.film.width, self.scene.film.height)
     }
 
+    /// Samples per pixel that the scene asks for.
     #[getter]
     fn spp(&self) -> u32 {
         self.scene.sample_count
     }
 
+    /// Triangles that occlude.
     #[getter]
     fn triangles(&self) -> usize {
         self.scene.surfaces.iter().map(|s| s.triangles.len()).sum()
     }
 
+    /// CRC-32 of the scene as it is rendered; ``vdf.sceneHash`` of an EXR.
     #[getter]
     fn checksum(&self) -> u32 {
         self.scene.checksum()
     }
 
+    /// What is legal but probably not meant, with file and line.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.scene.warnings.clone()
@@ -127,9 +145,15 @@ impl PyScene {
         format!("<vdf.Scene {} of {} triangles, {width} x {height} pixels>", self.name, self.triangles())
     }
 
+    /// Render the scene; the image has the bytes that ``vdf render`` gives it.
+    ///
+    /// What is None is as the scene says, or chosen. ``voxel`` is in world units; ``crop`` is x0, y0, x1, y1 in pixels, with
+    /// x1 and y1 one past the last. Other threads of Python run meanwhile, and Ctrl-C stops it with KeyboardInterrupt.
+    ///
+    /// Raises ValueError if an option is not usable.
     #[pyo3(signature = (*, spp = None, seed = None, method = None, integrator = "volpath", samples_per_segment = None,
         estimator = "thesis", sampler = "independent", transmittance = "analytic", roulette = "standard", voxel = None,
-        crop = None, layers = Vec::new(), threads = None))]
+        crop = None, layers = None, threads = None))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn render(
         &self,
@@ -145,7 +169,7 @@ impl PyScene {
         roulette: &str,
         voxel: Option<f64>,
         crop: Option<(u32, u32, u32, u32)>,
-        layers: Vec<String>,
+        layers: Option<Vec<String>>,
         threads: Option<usize>,
     ) -> PyResult<PyRendering> {
         let mut kind: Integrator = parsed(integrator)?;
@@ -153,7 +177,7 @@ impl PyScene {
             let wrong = || PyValueError::new_err("samples_per_segment goes with the integrator raymarch only");
             kind = kind.with_samples_per_segment(n).ok_or_else(wrong)?;
         }
-        let layers: Layers = layers.iter().map(|name| parsed::<Layer>(name)).collect::<PyResult<_>>()?;
+        let layers: Layers = layers.iter().flatten().map(|name| parsed::<Layer>(name)).collect::<PyResult<_>>()?;
         let transmittances = [TransmittanceEstimator::Analytic, TransmittanceEstimator::Analog];
         let roulettes = [Roulette::Standard, Roulette::Thesis];
         let options = RenderOptions {
@@ -171,7 +195,7 @@ impl PyScene {
         };
         let method = method.map(parsed::<Method>).transpose()?;
         let prepare = PrepareOptions { method, voxel_size: voxel, threads, ..PrepareOptions::default() };
-        options.validate(&self.scene).map_err(|e| value_error(&e))?;
+        options.validate(&self.scene).map_err(|e| exception(&e))?;
         let rendered = interruptible(py, |stop| {
             let prepared = self.prepared(&prepare, stop)?;
             let film = LiveFilm::new(prepared.film(&options, &self.name)?);
@@ -184,7 +208,7 @@ impl PyScene {
             let statistics = prepared.statistics(&options, &film, spp)?;
             Ok::<_, RenderError>((film.develop()?, film.develop_layers(), statistics))
         })?;
-        let (image, channels, statistics) = rendered.map_err(|e| value_error(&e))?;
+        let (image, channels, statistics) = rendered.map_err(|e| exception(&e))?;
         finished(py, image, layers, channels, &statistics)
     }
 }
