@@ -3,7 +3,7 @@
 use std::{collections::BTreeSet, path::Path, process::Command};
 
 /// Who may depend on whom: each crate, and the crates of this workspace that it may know. An arrow that is added here is a decision.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     ("vdf-geometry", &[]),
     ("vdf-voxel", &[]),
     ("vdf-distfield", &["vdf-voxel"]),
@@ -26,6 +26,7 @@ const ARROWS: [(&str, &[&str]); 11] = [
         ],
     ),
     ("vdf-cli", &["vdf-voxel", "vdf-visibility", "vdf-scene", "vdf-image", "vdf-render", "vdf-scenes", "vdf-lab"]),
+    ("vdf-python", &["vdf-geometry", "vdf-visibility", "vdf-scene", "vdf-scenes", "vdf-image", "vdf-render"]),
     (
         "vdf",
         &[

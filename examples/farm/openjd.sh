@@ -2,18 +2,19 @@
 # Renders in eight shards by Open Job Description on this machine, kills one task and runs it again, and compares the result with the whole render.
 #
 #   pip install openjd-cli
-#   cargo build --release && examples/farm/openjd.sh target/release/vdf
+#   cargo build --release && examples/farm/openjd.sh target/release/vdf [SPP]
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 vdf=$(realpath "${1:-target/release/vdf}")
+spp=${2:-512}
 work=$(mktemp -d)
 trap 'rm -r "$work"' EXIT
 mkdir "$work/shards"
 size="-D width=96 -D height=72"
-parameters=(-p "Vdf=$vdf" -p Spp=512 -p Every=100ms -p "Options=$size" -p "Folder=$work/shards" -p "Output=$work/merged.exr")
+parameters=(-p "Vdf=$vdf" -p Spp="$spp" -p Every=100ms -p "Options=$size" -p "Folder=$work/shards" -p "Output=$work/merged.exr")
 
 # shellcheck disable=SC2086
-"$vdf" render --spp 512 $size -q -o "$work/whole.exr" --reproducible
+"$vdf" render --spp "$spp" $size -q -o "$work/whole.exr" --reproducible
 
 # One task is killed like a machine that loses power, as soon as it has a checkpoint.
 setsid openjd run "$here/openjd.yaml" "${parameters[@]}" --step Render -tp Shard=3 >"$work/killed.log" 2>&1 &

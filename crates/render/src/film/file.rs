@@ -60,67 +60,43 @@ struct Header {
     runs: Vec<FilmRun>,
 }
 
-/// [`Counters`], in the order of their declaration.
+/// [`Counters`], in the order that `counts!` gives them.
 #[derive(Serialize, Deserialize)]
 struct Counts([u64; 13]);
 
-impl From<&Counters> for Counts {
-    fn from(c: &Counters) -> Self {
-        // No `..`: who adds a counter has to add it here.
-        let &Counters {
-            queries,
-            spatial,
-            proved,
-            on_light,
-            on_light_proved,
-            superficial_proved,
-            proved_occluded,
-            rays,
-            flights,
-            flights_proved,
-            lit_segments,
-            paths,
-            refused,
-        } = c;
-        Self([
-            queries,
-            spatial,
-            proved,
-            on_light,
-            on_light_proved,
-            superficial_proved,
-            proved_occluded,
-            rays,
-            flights,
-            flights_proved,
-            lit_segments,
-            paths,
-            refused,
-        ])
-    }
+macro_rules! counts {
+    ($($counter:ident),*) => {
+        impl From<&Counters> for Counts {
+            fn from(counters: &Counters) -> Self {
+                // No `..`: who adds a counter has to add it here.
+                let &Counters { $($counter),* } = counters;
+                Self([$($counter),*])
+            }
+        }
+
+        impl From<Counts> for Counters {
+            fn from(Counts([$($counter),*]): Counts) -> Self {
+                Self { $($counter),* }
+            }
+        }
+    };
 }
 
-impl From<Counts> for Counters {
-    fn from(Counts(c): Counts) -> Self {
-        let [queries, spatial, proved, on_light, on_light_proved, superficial_proved, proved_occluded, rays, ..] = c;
-        let [.., flights, flights_proved, lit_segments, paths, refused] = c;
-        Self {
-            queries,
-            spatial,
-            proved,
-            on_light,
-            on_light_proved,
-            superficial_proved,
-            proved_occluded,
-            rays,
-            flights,
-            flights_proved,
-            lit_segments,
-            paths,
-            refused,
-        }
-    }
-}
+counts!(
+    queries,
+    spatial,
+    proved,
+    on_light,
+    on_light_proved,
+    superficial_proved,
+    proved_occluded,
+    rays,
+    flights,
+    flights_proved,
+    lit_segments,
+    paths,
+    refused
+);
 
 impl Film {
     /// Writes the film. The file appears whole or not at all; an older one stays until then.
@@ -141,7 +117,11 @@ impl Film {
             .map_err(|source| FilmFileError::Write { path: path.to_owned(), source })
     }
 
-    fn encode(&self, out: &mut dyn Write) -> io::Result<()> {
+    /// Writes what [`Film::decode`] reads to anywhere.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn encode(&self, out: &mut dyn Write) -> io::Result<()> {
         let header = Header {
             origin: self.origin.clone(),
             picture: self.picture.clone(),
@@ -241,11 +221,13 @@ impl<R: Read> Source<R> {
     }
 
     /// Compares the checksum of all since the last one with that in the file.
+    #[allow(unexpected_cfgs, reason = "cargo-fuzz sets it")]
     fn check(&mut self, what: &str) -> Result<(), Failure> {
         let computed = std::mem::take(&mut self.crc).finalize();
         let stored = self.word()?;
         self.crc = crc32fast::Hasher::new();
-        if stored == computed {
+        // Nobody guesses a checksum: with it no fuzzer would come further.
+        if stored == computed || cfg!(fuzzing) {
             return Ok(());
         }
         Err(damaged(format!("{what} is damaged: its checksum is {computed:08x} and should be {stored:08x}")))

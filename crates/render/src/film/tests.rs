@@ -193,7 +193,9 @@ fn decoded(bytes: &[u8]) -> Result<Film, FilmFileError> {
 fn files_keep_every_bit() {
     let mut film = film(3..10);
     film.merge(part(&FilmPart { samples: 12..13, tiles: (1, 2) })).unwrap();
-    film.picture = Picture { name: "größe".to_owned(), half: true, world_to_camera: [0.1; 16] };
+    // As JSON has them, numbers of 17 digits, not all of which are read back by those who hurry.
+    let world_to_camera = std::array::from_fn(|i| value(i, 0).x.sin());
+    film.picture = Picture { name: "größe".to_owned(), half: true, world_to_camera };
     film.counters = Counters { queries: u64::MAX, rays: 2, refused: 3, ..Counters::default() };
     film.set_run(0, FilmRun { machine: "m".to_owned(), t_render: 0.1, ..FilmRun::default() });
     assert_eq!(decoded(&encoded(&film)).unwrap(), film);
@@ -224,6 +226,57 @@ fn damaged_files_are_refused_with_the_reason() {
     pixel[last] ^= 1;
     assert!(decoded(&pixel).unwrap_err().to_string().contains("tile 1 is damaged: its checksum is"));
     assert!(decoded(b"VDFQUERY12345678").unwrap_err().to_string().contains("it is no film of vdf"));
+}
+
+/// Headers that lie, with a checksum that fits, must not cost memory or time either.
+#[test]
+fn headers_that_lie_are_refused() {
+    let bytes = encoded(&film(3..6));
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let header = std::str::from_utf8(&bytes[16..16 + length]).unwrap();
+    let with = |from: &str, to: &str| {
+        assert!(header.contains(from), "{header}");
+        let changed = header.replacen(from, to, 1);
+        let mut lying = [&bytes[..12], &(changed.len() as u32).to_le_bytes(), changed.as_bytes()].concat();
+        lying.extend(crc32fast::hash(&lying).to_le_bytes());
+        lying.extend(&bytes[20 + length..]);
+        decoded(&lying)
+    };
+    let same = with("\"seed\":7", "\"seed\": 7").unwrap();
+    assert_eq!(same, film(3..6));
+    let huge = "4294967295,4294967295]";
+    for (from, to, reason) in [
+        ("\"crop\":[0,0,17,1]", "\"crop\":[0,0,18,1]", "the crop is larger than the film"),
+        ("\"crop\":[0,0,17,1]", "\"crop\":[9,0,9,1]", "the crop has no pixels"),
+        ("\"crop\":[0,0,17,1]", "\"crop\":[0,0,16,1]", "bytes follow its end"),
+        ("\"crop\":[0,0,17,1]", "\"crop\":[2,0,17,1]", "its tile 0 is damaged"),
+        ("17,1],\"crop\":[0,0,17,1]", &format!("{huge},\"crop\":[0,0,{huge}"), "the file is cut off"),
+        ("\"layers\":[", "\"layers\":[\"colour\"", "its header: "),
+        ("\"seed\":7", "\"seed\":-7", "its header: "),
+        ("\"seed\":7", "\"sead\":7", "missing field `seed`"),
+    ] {
+        let error = with(from, to).map(drop).expect_err(to).to_string();
+        assert!(error.contains(reason), "{to}: {error}");
+    }
+}
+
+#[test]
+fn blocks_in_another_order_or_twice_are_refused() {
+    let change = |change: fn(&mut FilmTile)| {
+        let mut film = film(3..6);
+        change(&mut film.tiles[1]);
+        let mut bytes = Vec::new();
+        film.encode(&mut bytes).unwrap();
+        decoded(&bytes).map(drop)
+    };
+    change(|_| {}).unwrap();
+    let wrongs: [fn(&mut FilmTile); 2] = [|t| t.blocks.swap(0, 1), |t| t.blocks[1] = t.blocks[0].clone()];
+    for wrong in wrongs {
+        let error = change(wrong).unwrap_err().to_string();
+        assert!(error.contains("its tile 1 is damaged: its blocks are not in order"), "{error}");
+    }
+    let error = change(|tile| tile.blocks[1].0.level = 33).unwrap_err().to_string();
+    assert!(error.contains("its tile 1 is damaged"), "{error}");
 }
 
 #[test]

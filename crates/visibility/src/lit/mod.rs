@@ -94,6 +94,28 @@ impl LitIntervals {
         begins.zip(ends).map(|(begin, end)| [begin, end]).filter(|[begin, end]| begin < end)
     }
 
+    /// All that is not certainly dark: closed intervals, disjoint and in order. Each is [`Answer::Unoccluded`] or [`Answer::Unknown`] as a whole, and all
+    /// parameters in [0, 1] that are in none are [`Answer::Occluded`]; so they say what [`LitIntervals::answer`] says, to the last bit.
+    pub fn parts(&self) -> impl Iterator<Item = ([f64; 2], Answer)> {
+        (0..=self.shade.len())
+            .flat_map(|i| {
+                // What is lit ends just before a shade, and begins just after the one before.
+                let begin = i.checked_sub(1).map_or(0.0, |before| self.shade[before][1].next_up());
+                let end = self.shade.get(i).map_or(1.0, |shade| shade[0].next_down());
+                let lit = std::iter::once(([begin, end], Answer::Unoccluded));
+                lit.chain(self.shade.get(i).into_iter().flat_map(|&shade| self.unknown_of(shade)))
+            })
+            .filter(|([begin, end], _)| begin <= end)
+    }
+
+    /// What is between the dark pieces of a shade; where they touch, or lie beyond it, the end is less than the beginning.
+    fn unknown_of(&self, [begin, end]: [f64; 2]) -> impl Iterator<Item = ([f64; 2], Answer)> {
+        let (begin, end) = (begin.max(0.0), end.min(1.0));
+        let begins = std::iter::once(begin).chain(self.dark.iter().map(move |[_, dark]| dark.t.next_up().max(begin)));
+        let ends = self.dark.iter().map(move |[dark, _]| dark.t.next_down().min(end)).chain([end]);
+        begins.zip(ends).map(|piece| (piece.into(), Answer::Unknown))
+    }
+
     /// The parameters, together, at which nothing is known, in [0, 1].
     #[must_use]
     #[inline]

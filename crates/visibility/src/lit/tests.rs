@@ -104,7 +104,7 @@ fn hard_point(random: &mut fastrand::Rng, triangles: &[Triangle], kind: usize) -
 }
 
 /// Every certain answer is that of the twin: at both ends of all intervals and some ulps about them, where rounding decides, on vertices and edges, in
-/// between. And what is open is what is not dark.
+/// between. And what is open is what is not dark, and what the parts say is the same.
 #[track_caller]
 fn check(case: &str, triangles: &[Triangle], bvh: &Bvh, light: DVec3, segment: &Segment, place: f64) -> [usize; 3] {
     let lit = LitIntervals::new(bvh, light, segment);
@@ -113,6 +113,12 @@ fn check(case: &str, triangles: &[Triangle], bvh: &Bvh, light: DVec3, segment: &
     for [begin, end] in lit.open() {
         assert!(last < begin && begin < end && end <= 1.0, "{case}: {lit:?}");
         places.extend([begin, end, 0.5 * (begin + end), begin + (end - begin) * 0.9]);
+        last = end;
+    }
+    last = -1.0;
+    for ([begin, end], _) in lit.parts() {
+        assert!(last < begin && begin <= end && end <= 1.0, "{case}: {lit:?}");
+        places.extend([begin, end, begin.next_down(), end.next_up()]);
         last = end;
     }
     places.extend(lit.shade.as_flattened());
@@ -134,6 +140,8 @@ fn check(case: &str, triangles: &[Triangle], bvh: &Bvh, light: DVec3, segment: &
             let open = lit.open().any(|[begin, end]| begin < t && t < end);
             assert!(open || answer == Answer::Occluded || t == 0.0 || t == 1.0, "{case}: {t:e} {lit:?}");
             assert!(!open || answer != Answer::Occluded, "{case}: {t:e} {lit:?}");
+            let of_parts = lit.parts().find(|([begin, end], _)| (begin..=end).contains(&&t)).map(|(_, answer)| answer);
+            assert_eq!(of_parts.unwrap_or(Answer::Occluded), answer, "{case}: {t:e} {lit:?}");
         }
     }
     counts
