@@ -14,8 +14,8 @@ use pyo3::{
 };
 use vdf_image::Image;
 use vdf_render::{
-    Estimator, FilmPart, Integrator, Layer, Layers, LiveFilm, PrepareOptions, PreparedScene, RenderError,
-    RenderOptions, Roulette, SamplerKind, Statistics, TransmittanceEstimator,
+    Estimator, FilmPart, Integrator, Layer, Layers, LiveFilm, NoiseLimit, PrepareOptions, PreparedScene, RenderError,
+    RenderOptions, Roulette, SamplerKind, SegmentSamples, Statistics, TransmittanceEstimator,
 };
 use vdf_scene::{LoadOptions, PixelRect, Scene, SceneSource};
 use vdf_scenes::builtin;
@@ -90,6 +90,22 @@ fn source(path: &Path) -> PyResult<SceneSource> {
         .ok_or_else(|| PyFileNotFoundError::new_err(format!("{}: no such file, nor a built-in scene", path.display())))
 }
 
+/// What ``samples_per_segment`` takes.
+#[derive(FromPyObject)]
+enum Samples {
+    Count(u32),
+    Name(String),
+}
+
+impl Samples {
+    fn resolved(self) -> PyResult<SegmentSamples> {
+        match self {
+            Self::Count(n) => Ok(SegmentSamples::Count(n)),
+            Self::Name(name) => name.parse().map_err(|e| PyValueError::new_err(format!("samples_per_segment {e}"))),
+        }
+    }
+}
+
 /// One of several by its name.
 fn named<T: Copy>(what: &str, name: &str, all: &[T], of: fn(T) -> &'static str) -> PyResult<T> {
     all.iter().copied().find(|&one| of(one) == name).ok_or_else(|| {
@@ -148,12 +164,13 @@ impl PyScene {
     /// Render the scene; the image has the bytes that ``vdf render`` gives it.
     ///
     /// What is None is as the scene says, or chosen. ``voxel`` is in world units; ``crop`` is x0, y0, x1, y1 in pixels, with
-    /// x1 and y1 one past the last. Other threads of Python run meanwhile, and Ctrl-C stops it with KeyboardInterrupt.
+    /// x1 and y1 one past the last. With a limit of ``noise`` each tile of 16 x 16 pixels gets samples until the standard error of
+    /// its pixels over their mean is below it, and there are the layers variance and samples. Other threads of Python run meanwhile, and Ctrl-C stops it with KeyboardInterrupt.
     ///
     /// Raises ValueError if an option is not usable.
     #[pyo3(signature = (*, spp = None, seed = None, method = None, integrator = "volpath", samples_per_segment = None,
-        estimator = "thesis", sampler = "independent", transmittance = "analytic", roulette = "standard", voxel = None,
-        crop = None, layers = None, threads = None))]
+        estimator = "equiangular", sampler = "sobol", transmittance = "analytic", roulette = "standard", voxel = None,
+        crop = None, layers = None, noise = None, threads = None))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn render(
         &self,
@@ -162,7 +179,7 @@ impl PyScene {
         seed: Option<u64>,
         method: Option<&str>,
         integrator: &str,
-        samples_per_segment: Option<u32>,
+        samples_per_segment: Option<Samples>,
         estimator: &str,
         sampler: &str,
         transmittance: &str,
@@ -170,13 +187,16 @@ impl PyScene {
         voxel: Option<f64>,
         crop: Option<(u32, u32, u32, u32)>,
         layers: Option<Vec<String>>,
+        noise: Option<f64>,
         threads: Option<usize>,
     ) -> PyResult<PyRendering> {
         let mut kind: Integrator = parsed(integrator)?;
         if let Some(n) = samples_per_segment {
             let wrong = || PyValueError::new_err("samples_per_segment goes with the integrator raymarch only");
-            kind = kind.with_samples_per_segment(n).ok_or_else(wrong)?;
+            kind = kind.with_samples_per_segment(n.resolved()?).ok_or_else(wrong)?;
         }
+        let noise = noise.map(NoiseLimit::try_from).transpose();
+        let noise = noise.map_err(|e| PyValueError::new_err(format!("noise {e}")))?;
         let layers: Layers = layers.iter().flatten().map(|name| parsed::<Layer>(name)).collect::<PyResult<_>>()?;
         let transmittances = [TransmittanceEstimator::Analytic, TransmittanceEstimator::Analog];
         let roulettes = [Roulette::Standard, Roulette::Thesis];
@@ -186,12 +206,13 @@ impl PyScene {
             roulette: named("roulette", roulette, &roulettes, Roulette::name)?,
             estimator: named("estimator", estimator, &Estimator::ALL, Estimator::name)?,
             sampler: named("sampler", sampler, &SamplerKind::ALL, SamplerKind::name)?,
-            spp,
+            spp: spp.or_else(|| noise.map(|_| NoiseLimit::MOST_SAMPLES)),
             seed,
             threads,
             crop: crop.map(|(x0, y0, x1, y1)| PixelRect { x0, y0, x1, y1 }),
             segment_first: false,
             layers,
+            noise,
         };
         let method = method.map(parsed::<Method>).transpose()?;
         let prepare = PrepareOptions { method, voxel_size: voxel, threads, ..PrepareOptions::default() };
@@ -209,7 +230,7 @@ impl PyScene {
             Ok::<_, RenderError>((film.develop()?, film.develop_layers(), statistics))
         })?;
         let (image, channels, statistics) = rendered.map_err(|e| exception(&e))?;
-        finished(py, image, layers, channels, &statistics)
+        finished(py, image, options.kept_layers(), channels, &statistics)
     }
 }
 

@@ -46,6 +46,7 @@ def test_a_render_is_an_array_and_a_dictionary(scene):
     [
         {"spp": 5, "seed": 3, "method": "amr-xsn", "crop": (2, 3, 22, 19), "layers": ["normal", "depth", "variance"]},
         {"spp": 2, "integrator": "raymarch", "samples_per_segment": 5, "estimator": "lit", "sampler": "sobol"},
+        {"spp": 64, "integrator": "raymarch", "samples_per_segment": "auto", "noise": 0.3},
         {"spp": 3, "transmittance": "analog", "roulette": "thesis", "voxel": 16.0, "method": "ndf"},
     ],
 )
@@ -71,6 +72,8 @@ def test_errors_say_what_is_wrong(scene, tmp_path):
         ({"voxel": float("nan")}, "voxel must be a positive finite number"),
         ({"sampler": "halton"}, "sampler must be one of independent, sobol"),
         ({"samples_per_segment": 3}, "raymarch only"),
+        ({"samples_per_segment": "many", "integrator": "raymarch"}, "samples_per_segment must be a number from 1 on, or auto"),
+        ({"noise": 0.0}, "noise must be a positive number"),
         ({"layers": ["colour"]}, "unknown layer; the layers are albedo"),
         ({"crop": (0, 0, 99, 1)}, "crop"),
     ]:

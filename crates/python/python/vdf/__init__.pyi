@@ -49,20 +49,22 @@ class Scene:
         seed: int | None = None,
         method: str | None = None,
         integrator: Literal["volpath", "raymarch"] = "volpath",
-        samples_per_segment: int | None = None,
-        estimator: Literal["thesis", "equiangular", "lit"] = "thesis",
-        sampler: Literal["independent", "sobol"] = "independent",
+        samples_per_segment: int | Literal["auto"] | None = None,
+        estimator: Literal["thesis", "equiangular", "lit"] = "equiangular",
+        sampler: Literal["independent", "sobol"] = "sobol",
         transmittance: Literal["analytic", "analog"] = "analytic",
         roulette: Literal["standard", "thesis"] = "standard",
         voxel: float | None = None,
         crop: tuple[int, int, int, int] | None = None,
         layers: Sequence[_Layer] | None = None,
+        noise: float | None = None,
         threads: int | None = None,
     ) -> Rendering:
         """Render the scene; the image has the bytes that ``vdf render`` gives it.
 
         What is None is as the scene says, or chosen. ``voxel`` is in world units; ``crop`` is x0, y0, x1, y1 in pixels, with
-        x1 and y1 one past the last. Other threads of Python run meanwhile, and Ctrl-C stops it with KeyboardInterrupt.
+        x1 and y1 one past the last. With a limit of ``noise`` each tile of 16 x 16 pixels gets samples until the standard error of
+        its pixels over their mean is below it, and there are the layers variance and samples. Other threads of Python run meanwhile, and Ctrl-C stops it with KeyboardInterrupt.
 
         Raises ValueError if an option is not usable.
         """

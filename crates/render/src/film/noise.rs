@@ -26,6 +26,11 @@ const FEWEST: u64 = 16;
 #[serde(try_from = "f64", into = "f64")]
 pub struct NoiseLimit(f64);
 
+impl NoiseLimit {
+    /// The most samples per pixel where only noise limits a render: beside a point light there may be pixels whose noise never ends.
+    pub const MOST_SAMPLES: u32 = 1 << 14;
+}
+
 // Never a NaN.
 impl Eq for NoiseLimit {}
 

@@ -15,8 +15,8 @@ use anyhow::{Context as _, anyhow};
 use vdf_image::{StagedFile, check_distinct, shown};
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Estimator, Film, Integrator, PrepareOptions, PreparedScene, RenderOptions, Roulette, SamplerKind, SegmentSamples,
-    TransmittanceEstimator, thread_count,
+    Estimator, Film, Integrator, NoiseLimit, PrepareOptions, PreparedScene, RenderOptions, Roulette, SamplerKind,
+    SegmentSamples, TransmittanceEstimator, thread_count,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
@@ -33,8 +33,6 @@ use crate::{
 
 /// So many samples per pixel are more than a limit of time lets anyone take.
 const MOST_SAMPLES: u32 = 1 << 30;
-/// Where only noise limits a render: beside a point light there may be pixels whose noise never ends.
-const MOST_SAMPLES_FOR_NOISE: u32 = 1 << 14;
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     if args.long.progress == ProgressName::Json {
@@ -52,7 +50,7 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     if args.long.time_limit.is_some() {
         options.spp = Some(options.spp.unwrap_or(MOST_SAMPLES));
     } else if options.noise.is_some() {
-        options.spp = Some(options.spp.unwrap_or(MOST_SAMPLES_FOR_NOISE));
+        options.spp = Some(options.spp.unwrap_or(NoiseLimit::MOST_SAMPLES));
     }
     let prepare = PrepareOptions {
         // Proofs of flights need a field, whatever the lights.
