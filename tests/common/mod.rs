@@ -10,8 +10,8 @@ use vdf::{
         SamplerKind, TransmittanceEstimator,
     },
     scene::{
-        Boundary, ComponentFormat, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, PerspectiveSensor,
-        Phase, PixelRect, ReconstructionFilter, Rgb, Scene,
+        Boundary, ComponentFormat, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, Phase, PixelRect,
+        Projection, ReconstructionFilter, Rgb, Scene, Sensor,
     },
     visibility::Method,
 };
@@ -93,12 +93,11 @@ pub fn empty_scene(size: u32, spp: u32, tan_half_fov: f64) -> Scene {
         boundaries: vec![],
         media: vec![],
         emitters: vec![],
-        sensor: PerspectiveSensor {
+        sensor: Sensor {
             world_from_camera: DMat4::IDENTITY,
-            tan_half_fov_x: tan_half_fov,
+            projection: Projection::Perspective { tan_half_fov_x: tan_half_fov, lens: None },
             near_clip: 1e-9,
             far_clip: 1e6,
-            lens: None,
             medium: None,
         },
         film: FilmSettings {

@@ -95,6 +95,8 @@ PLAN = [
     Case("textures", 8, 64, 128),
     Case("metals_and_coats", -1, 64, 256),
     Case("glass_blocks", -1, 64, 256),
+    Case("disney", 8, 64, 256),
+    Case("turned", 4, 64, 128),
 ]
 
 

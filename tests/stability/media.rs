@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
 use vdf::{
     geometry::{Segment, Triangle},
     render::{FreeFlight, Integrator, Media, PhaseFunction as _, RegionSet, Sampler},
-    scene::{Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Rgb, Scene, Surface},
+    scene::{Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Projection, Rgb, Scene, Surface},
 };
 
 use crate::{
@@ -243,7 +243,7 @@ fn case_41_peaked_phase_functions() {
 fn case_42_a_light_on_the_camera_ray() {
     for (x, z) in [(0.0, 3.0), (0.0, 1.5), (0.0, 1.2), (1e-17, 3.0), (1e-12, 3.0), (1e-6, 6.0), (0.0, 7.0)] {
         let mut scene = room(&[dvec3(4.0 + x, 4.0, z)]);
-        scene.sensor.tan_half_fov_x = 1e-12;
+        scene.sensor.projection = Projection::Perspective { tan_half_fov_x: 1e-12, lens: None };
         same_for_all_methods(&format!("light at {x}, {z}"), &scene, 1.0);
     }
 }

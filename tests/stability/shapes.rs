@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3, dvec3, vec3};
 use vdf::{
     geometry::{Bvh, Segment, Triangle, intersect_exact},
     render::{Sampler, World},
-    scene::{Bsdf, Emitter, Rgb, Surface},
+    scene::{Bsdf, Emitter, Projection, Rgb, Surface},
 };
 
 use crate::{
@@ -38,7 +38,7 @@ fn grazing_rays_along_walls() {
         let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
         scene.sensor.world_from_camera = DMat4::from_translation(dvec3(4.0, y, 1.5));
         scene.sensor.medium = None;
-        scene.sensor.tan_half_fov_x = 1e-9;
+        scene.sensor.projection = Projection::Perspective { tan_half_fov_x: 1e-9, lens: None };
         same_for_all_methods(&format!("camera at height {y}"), &scene, 1.0);
     }
 }

@@ -1,77 +1,143 @@
-//! The camera: a pinhole or a thin lens.
+//! The camera: a pinhole, a thin lens, or parallel rays.
 
 use glam::{DVec3, dvec3};
 use vdf_geometry::Segment;
-use vdf_scene::{FilmSettings, PerspectiveSensor};
+use vdf_scene::{FilmSettings, Lens, Projection, Sensor};
 
 /// A camera and its film, prepared for rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
-    sensor: PerspectiveSensor,
+    sensor: Sensor,
     /// Width and height of the full film in pixels.
     size: [f64; 2],
+}
+
+/// A camera ray.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRay {
+    /// Where it comes from: the camera, a point of its lens or, if rays are parallel, of its plane.
+    pub origin: DVec3,
+    /// The part of it from the near to the far plane.
+    pub segment: Segment,
+    /// Unit direction.
+    pub direction: DVec3,
 }
 
 impl Camera {
     /// The camera of a sensor with this film.
     #[must_use]
-    pub fn new(sensor: &PerspectiveSensor, film: &FilmSettings) -> Self {
+    pub fn new(sensor: &Sensor, film: &FilmSettings) -> Self {
         Self { sensor: *sensor, size: [film.width.into(), film.height.into()] }
     }
 
-    /// The camera ray through film position (`x`, `y`) in pixels from the top left corner of the full film: a segment from
-    /// the near to the far plane, but no longer than `reach` world units, and its unit direction. Same geometry as Mitsuba 3 `perspective`.
+    /// The camera ray through film position (`x`, `y`) in pixels from the top left corner of the full film, no longer than `reach` world units; of a lens that
+    /// through its middle. Same geometry as Mitsuba 3 `perspective` and `orthographic`.
     #[inline]
     #[must_use]
-    pub fn ray(&self, x: f64, y: f64, reach: f64) -> (Segment, DVec3) {
+    pub fn ray(&self, x: f64, y: f64, reach: f64) -> CameraRay {
         let [width, height] = self.size;
+        let Projection::Perspective { tan_half_fov_x: t, .. } = self.sensor.projection else {
+            let (origin, slope) = self.sensor.ray(1.0 - 2.0 * x / width, 1.0 - 2.0 * y / height, width / height);
+            return self.between_planes(origin, slope, reach);
+        };
+        let slope = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
+        let (p, q, direction) = self.clipped(|depth| slope * depth, slope, reach);
+        CameraRay { origin: self.position(), segment: Segment::new(p, q), direction }
+    }
+
+    /// The lens, if there is one, on which [`Camera::ray_through`] wants a point.
+    #[inline]
+    #[must_use]
+    pub const fn lens(&self) -> Option<Lens> {
+        match self.sensor.projection {
+            Projection::Perspective { lens, .. } => lens,
+            Projection::Orthographic { .. } => None,
+        }
+    }
+
+    /// As [`Camera::ray`], through a point of the lens drawn by two uniform numbers. Same geometry as Mitsuba 3 `thinlens`: the rays of one film position meet in
+    /// the plane of focus.
+    #[must_use]
+    pub fn ray_through(&self, lens: &Lens, x: f64, y: f64, reach: f64, [u0, u1]: [f64; 2]) -> CameraRay {
+        let [width, height] = self.size;
+        let (_, through) = self.sensor.ray(1.0 - 2.0 * x / width, 1.0 - 2.0 * y / height, width / height);
+        let (radius, (sin, cos)) = (lens.radius * u0.sqrt(), (std::f64::consts::TAU * u1).sin_cos());
+        let on_lens = dvec3(radius * cos, radius * sin, 0.0);
+        self.between_planes(on_lens, (through * lens.focus_distance - on_lens) / lens.focus_distance, reach)
+    }
+
+    /// The ray from a point of the camera's plane, in its space, that goes on by `slope` for each unit of depth.
+    fn between_planes(&self, start: DVec3, slope: DVec3, reach: f64) -> CameraRay {
+        let (p, q, direction) = self.clipped(|depth| start + slope * depth, slope, reach);
+        let origin = self.sensor.world_from_camera.transform_point3(start);
+        CameraRay { origin, segment: Segment::new(p, q), direction }
+    }
+
+    /// Where a ray meets the planes, and its direction, in the world.
+    #[inline(always)]
+    fn clipped(&self, at: impl Fn(f64) -> DVec3, slope: DVec3, reach: f64) -> (DVec3, DVec3, DVec3) {
         let s = &self.sensor;
-        let t = s.tan_half_fov_x;
-        let local = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
-        let p = s.world_from_camera.transform_point3(local * s.near_clip);
-        let direction = s.world_from_camera.transform_vector3(local).normalize();
+        let p = s.world_from_camera.transform_point3(at(s.near_clip));
+        let direction = s.world_from_camera.transform_vector3(slope).normalize();
         // A plane beyond all of the scene clips nothing; squares of its distance would overflow.
         let q = if s.far_clip < reach {
-            s.world_from_camera.transform_point3(local * s.far_clip)
+            s.world_from_camera.transform_point3(at(s.far_clip))
         } else {
             p + direction * reach
         };
-        (Segment::new(p, q), direction)
+        (p, q, direction)
     }
 
-    /// Whether it has a lens, on which [`Camera::ray_through`] wants a point.
-    #[inline]
-    #[must_use]
-    pub fn has_lens(&self) -> bool {
-        self.sensor.lens.is_some()
-    }
-
-    /// As [`Camera::ray`], through a point of the lens drawn by two uniform numbers; and that point. Same geometry as Mitsuba 3 `thinlens`: the rays of one
-    /// film position meet in the plane of focus.
-    #[must_use]
-    pub fn ray_through(&self, x: f64, y: f64, reach: f64, [u0, u1]: [f64; 2]) -> (DVec3, Segment, DVec3) {
-        let s = &self.sensor;
-        let Some(lens) = &s.lens else {
-            let (segment, direction) = self.ray(x, y, reach);
-            return (self.position(), segment, direction);
-        };
-        let [width, height] = self.size;
-        let t = s.tan_half_fov_x;
-        let through = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
-        let (radius, (sin, cos)) = (lens.radius * u0.sqrt(), (std::f64::consts::TAU * u1).sin_cos());
-        let on_lens = dvec3(radius * cos, radius * sin, 0.0);
-        let local = (through * lens.focus_distance - on_lens) / lens.focus_distance;
-        let at = |depth: f64| s.world_from_camera.transform_point3(on_lens + local * depth);
-        let p = at(s.near_clip);
-        let direction = s.world_from_camera.transform_vector3(local).normalize();
-        let q = if s.far_clip < reach { at(s.far_clip) } else { p + direction * reach };
-        (at(0.0), Segment::new(p, q), direction)
-    }
-
-    /// Where all rays come from; with a lens its middle.
+    /// Where the camera is: where all rays come from, the middle of the lens, or the middle of the plane that parallel rays come from.
     #[inline]
     #[must_use]
     pub fn position(&self) -> DVec3 {
         self.sensor.world_from_camera.w_axis.truncate()
+    }
+
+    /// How far a point is from where its ray comes from; from the middle of a lens.
+    #[must_use]
+    pub fn distance(&self, point: DVec3) -> f64 {
+        match self.sensor.projection {
+            Projection::Perspective { .. } => point.distance(self.position()),
+            Projection::Orthographic { .. } => {
+                (point - self.position()).dot(self.sensor.world_from_camera.z_axis.truncate())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat4;
+    use vdf_scene::{ComponentFormat, PixelRect, ReconstructionFilter};
+
+    use super::*;
+
+    /// Numbers that Mitsuba 3.9.1 prints for the corner of a film of 200 × 120 pixels, a camera that is scaled by (1.5, 2, 3) and turned, and clip planes at 1 and 7.
+    #[test]
+    fn parallel_rays_are_those_of_mitsuba() {
+        let film = FilmSettings {
+            width: 200,
+            height: 120,
+            crop: PixelRect { x0: 0, y0: 0, x1: 200, y1: 120 },
+            filter: ReconstructionFilter::Box,
+            component_format: ComponentFormat::Float32,
+        };
+        // Forward is +X, up +Z, so that left is +Y.
+        let axes = [DVec3::Y, DVec3::Z, DVec3::X].map(|a| a.extend(0.0));
+        let sensor = Sensor {
+            world_from_camera: DMat4::from_cols(axes[0], axes[1], axes[2], dvec3(-5.0, 0.5, 3.0).extend(1.0)),
+            projection: Projection::Orthographic { half_width: 1.5, half_height: 1.2 },
+            near_clip: 3.0,
+            far_clip: 9.0,
+            medium: None,
+        };
+        let ray = Camera::new(&sensor, &film).ray(0.0, 0.0, 1e9);
+        assert_eq!((ray.segment.p, ray.segment.q), (dvec3(-2.0, 2.0, 4.2), dvec3(4.0, 2.0, 4.2)));
+        assert_eq!((ray.direction, ray.origin), (DVec3::X, dvec3(-5.0, 2.0, 4.2)));
+        let camera = Camera::new(&sensor, &film);
+        assert_eq!(camera.distance(dvec3(1.0, 7.0, 7.0)), 6.0);
+        assert_eq!(camera.ray(150.0, 30.0, 1e9).origin, dvec3(-5.0, 0.5 - 0.75, 3.6));
     }
 }

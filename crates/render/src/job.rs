@@ -138,21 +138,19 @@ impl<R: Recorder> PathTracer<'_, R> {
         let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, &mut sampler);
         let hit = self.tracer.world.bvh.intersect(&ray.segment);
         let surface = self.tracer.surface_met(hit, &ray.segment, ray.direction)?;
-        let depth = surface.point.distance(self.camera.position());
+        let depth = self.camera.distance(surface.point);
         Some(Feature { albedo: surface.reflectance, normal: surface.normal, position: surface.point, depth })
     }
 
-    /// The ray through a place of the film, from the camera's centre or from a point of its lens.
+    /// The ray through a place of the film.
     #[inline]
     fn camera_ray(&self, x: f64, y: f64, sampler: &mut Sampler) -> PathRay {
-        let (centre, reach) = (self.camera.position(), self.tracer.world.lights.reach());
-        let (position, segment, direction) = if self.camera.has_lens() {
-            self.camera.ray_through(x, y, reach, sampler.next_2d())
-        } else {
-            let (segment, direction) = self.camera.ray(x, y, reach);
-            (centre, segment, direction)
+        let reach = self.tracer.world.lights.reach();
+        let ray = match self.camera.lens() {
+            Some(lens) => self.camera.ray_through(&lens, x, y, reach, sampler.next_2d()),
+            None => self.camera.ray(x, y, reach),
         };
-        self.tracer.camera_ray(centre, position, segment, direction)
+        self.tracer.camera_ray(self.camera.position(), &ray)
     }
 
     /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.

@@ -50,7 +50,7 @@ mod statistics;
 mod threads;
 mod world;
 
-pub use camera::Camera;
+pub use camera::{Camera, CameraRay};
 pub use error::RenderError;
 pub use film::{
     Film, FilmError, FilmFileError, FilmOrigin, FilmRun, Layer, Layers, MissingSamples, NoNoiseLimit, NoiseLimit,

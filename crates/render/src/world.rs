@@ -2,14 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec3, Vec2, dvec3};
+use glam::{DVec3, Vec2, dvec3, vec2};
 use vdf_geometry::{Bounds, Bvh, CurvedKind, CurvedShape, Hit, Segment, Triangle};
-use vdf_scene::{Bsdf, Emitter, MeshAttributes, Rgb, Scene};
+use vdf_scene::{Bsdf, Emitter, MeshAttributes, Rgb, Scene, TexturePoint};
 use vdf_visibility::LightShape;
 
 use crate::{
     GridExtent,
-    bsdf::Material,
+    bsdf::{Material, MaterialPoint},
     lights::Lights,
     media::Media,
     others::{CurvedPoint, Met, OtherShapes, TrianglePlace},
@@ -60,6 +60,7 @@ struct SurfaceData {
 #[derive(Debug)]
 pub(crate) struct Shading {
     pub(crate) material: Material,
+    needs_tangents: bool,
     attributes: std::sync::Arc<MeshAttributes>,
 }
 
@@ -95,7 +96,7 @@ pub(crate) struct Place {
 pub(crate) struct ShadingPoint {
     /// Index into [`World::materials`].
     pub(crate) material: u32,
-    pub(crate) uv: Vec2,
+    pub(crate) at: MaterialPoint,
     /// The shading frame: unit vectors, the last is the normal, in front of the surface whichever side is seen.
     frame: [DVec3; 3],
     /// To where the path comes from, in that frame.
@@ -140,7 +141,8 @@ impl World {
             };
             let shading = plain.is_none().then(|| {
                 let material = Material::from(&s.bsdf);
-                materials.push(Shading { material, attributes: s.attributes.clone() });
+                let needs_tangents = material.needs_tangents();
+                materials.push(Shading { material, needs_tangents, attributes: s.attributes.clone() });
                 (materials.len() - 1) as u32
             });
             let veil = shading.is_some_and(|m| materials[m as usize].material.may_pass());
@@ -168,7 +170,7 @@ impl World {
         let curved = others.as_ref().map_or(Bounds::EMPTY, |o| o.bounds());
         let shapes = spheres.fold(bvh.bounds().union(boundaries).union(curved), Bounds::union);
         // No ray has to come near an emitter that is a point, so that a sun far away takes nobody's precision.
-        let matter = shapes.with(scene.sensor.world_from_camera.w_axis.truncate());
+        let matter = scene.sensor.origins().into_iter().fold(shapes, Bounds::with);
         let bounds = positions(scene).fold(matter, Bounds::with);
         Self {
             media: Media::of_scene(scene),
@@ -223,7 +225,7 @@ impl World {
     /// What of light that travels in `direction` passes the veil that a segment meets.
     pub(crate) fn passes(&self, met: &Met, segment: &Segment, direction: DVec3) -> Rgb {
         let shading = self.shading(&self.surface_at(met, segment, direction), direction);
-        shading.map_or(Rgb::ZERO, |s| self.materials[s.material as usize].material.passes(s.wi, s.uv))
+        shading.map_or(Rgb::ZERO, |s| self.materials[s.material as usize].material.passes(s.wi, &s.at))
     }
 
     /// What scattering at a point depends on, for a path that comes in `direction`; `None` at a plain one.
@@ -233,10 +235,12 @@ impl World {
         let data = &self.surfaces[place.surface as usize];
         let material = data.shading?;
         if let Some(shape) = &data.curved {
-            let at = point_of(shape, point.point);
-            let (uv, along) = parametrization(shape, at.local);
-            let frame = frame(at.normal, Some(along));
-            return Some(ShadingPoint { material, uv, wi: local(&frame, -direction), frame, lift: curved_lift(shape) });
+            let on_shape = point_of(shape, point.point);
+            let (uv, tangents) = parametrization(shape, on_shape.local);
+            let frame = frame(on_shape.normal, Some(tangents[0]));
+            let tangents = tangents.map(|t| local(&frame, t));
+            let at = MaterialPoint { texture: uv.into(), tangents, normal: DVec3::Z };
+            return Some(ShadingPoint { material, at, wi: local(&frame, -direction), frame, lift: curved_lift(shape) });
         }
         let index = (data.first_triangle + place.triangle) as usize;
         let triangle = match &self.others {
@@ -247,7 +251,8 @@ impl World {
     }
 
     fn shade_triangle(&self, shading: u32, triangle: &Triangle, place: &Place, direction: DVec3) -> ShadingPoint {
-        let MeshAttributes { normals, uvs } = &*self.materials[shading as usize].attributes;
+        let Shading { attributes, needs_tangents, .. } = &self.materials[shading as usize];
+        let MeshAttributes { normals, uvs } = &**attributes;
         let number = place.triangle as usize;
         let [wb, wc] = place.barycentric;
         let wa = 1.0 - wb - wc;
@@ -256,20 +261,27 @@ impl World {
             let [a, b, c] = n.map(|n| n.as_dvec3());
             (a * wa + b * wb + c * wc).normalize_or(own)
         });
-        let (uv, along) = match uvs.get(number) {
-            None => (Vec2::ZERO, None),
-            Some(&[a, b, c]) => {
-                let at = a.as_dvec2() * wa + b.as_dvec2() * wb + c.as_dvec2() * wc;
-                // ∂p/∂u, from p and (u, v) at the corners.
-                let [p, q, r] = triangle.vertices_f64();
-                let (du, dv) = ((b - a).as_dvec2(), (c - a).as_dvec2());
-                let determinant = du.perp_dot(dv);
-                let along = (q - p) * dv.y - (r - p) * du.y;
-                (at.as_vec2(), (determinant != 0.0).then(|| along * determinant.signum()))
-            }
-        };
-        let frame = frame(normal, along);
-        ShadingPoint { material: shading, uv, wi: local(&frame, -direction), frame, lift: lift(triangle) }
+        // Without texture coordinates these are the weights, as in Mitsuba.
+        let &[a, b, c] = uvs.get(number).unwrap_or(&[Vec2::ZERO, Vec2::X, Vec2::Y]);
+        let uv = (a.as_dvec2() * wa + b.as_dvec2() * wb + c.as_dvec2() * wc).as_vec2();
+        // ∂p/∂u and ∂p/∂v times a determinant, from p and (u, v) at the corners.
+        let [p, q, r] = triangle.vertices_f64();
+        let (du, dv) = ((b - a).as_dvec2(), (c - a).as_dvec2());
+        let determinant = du.perp_dot(dv);
+        let along = (q - p) * dv.y - (r - p) * du.y;
+        let frame = frame(normal, (determinant != 0.0).then(|| along * determinant.signum()));
+        let mut at =
+            MaterialPoint::from(TexturePoint { uv, triangle: place.triangle, barycentric: [wb as f32, wc as f32] });
+        if *needs_tangents {
+            let across = (r - p) * du.x - (q - p) * dv.x;
+            at.normal = local(&frame, if own.dot(normal) < 0.0 { -own } else { own });
+            at.tangents = if determinant == 0.0 {
+                [DVec3::X, DVec3::Y]
+            } else {
+                [along, across].map(|t| local(&frame, t / determinant))
+            };
+        }
+        ShadingPoint { material: shading, at, wi: local(&frame, -direction), frame, lift: lift(triangle) }
     }
 }
 
@@ -329,15 +341,19 @@ fn nothing(point: DVec3, direction: DVec3) -> SurfacePoint {
     SurfacePoint { point, normal: -direction, reflectance, emitted, emitter: None, place: None }
 }
 
-/// Texture coordinates as Mitsuba has them, and the direction in which u grows, in the world.
-fn parametrization(shape: &CurvedShape, p: DVec3) -> (Vec2, DVec3) {
+/// Texture coordinates as Mitsuba has them, and ∂p/∂u and ∂p/∂v in the world.
+fn parametrization(shape: &CurvedShape, p: DVec3) -> (Vec2, [DVec3; 2]) {
     let turn = (p.y.atan2(p.x) / TAU).rem_euclid(1.0);
-    let (uv, along) = match shape.kind() {
-        CurvedKind::Sphere => ((turn, p.z.clamp(-1.0, 1.0).acos() / PI), dvec3(-p.y, p.x, 0.0)),
-        CurvedKind::Disk => ((p.x.hypot(p.y), turn), dvec3(p.x, p.y, 0.0)),
-        CurvedKind::Cylinder => ((turn, p.z), dvec3(-p.y, p.x, 0.0)),
+    let radius = p.x.hypot(p.y);
+    // Outwards from the axis and around it.
+    let out = if radius > 0.0 { dvec3(p.x, p.y, 0.0) / radius } else { DVec3::X };
+    let around = dvec3(-p.y, p.x, 0.0) * TAU;
+    let (u, v, tangents) = match shape.kind() {
+        CurvedKind::Sphere => (turn, p.z.clamp(-1.0, 1.0).acos() / PI, [around, (out * p.z - DVec3::Z * radius) * PI]),
+        CurvedKind::Disk => (radius, turn, [out, around]),
+        CurvedKind::Cylinder => (turn, p.z, [around, DVec3::Z]),
     };
-    (Vec2::new(uv.0 as f32, uv.1 as f32), *shape.placement().0 * along)
+    (vec2(u as f32, v as f32), tangents.map(|t| *shape.placement().0 * t))
 }
 
 /// A frame about a normal whose first axis goes along with `along`, if that leads anywhere.
@@ -370,10 +386,7 @@ pub(crate) fn lift(triangle: &Triangle) -> f64 {
 
 /// The point emitters' positions.
 fn positions(scene: &Scene) -> impl Iterator<Item = DVec3> {
-    scene.emitters.iter().filter_map(|e| match e {
-        Emitter::Point { position, .. } | Emitter::Spot { position, .. } => Some(*position),
-        _ => None,
-    })
+    scene.emitters.iter().filter_map(Emitter::position)
 }
 
 /// The bounds of the occluders, and of the point emitters that are no farther from them than half their longest side: those get
@@ -393,7 +406,9 @@ fn occluder_bounds(scene: &Scene, bvh: &Bvh, all: Bounds) -> Bounds {
 #[must_use]
 pub fn light_shapes(scene: &Scene) -> Vec<LightShape<'_>> {
     let shape = |emitter: &Emitter| match *emitter {
-        Emitter::Point { position, .. } | Emitter::Spot { position, .. } => LightShape::Point(position),
+        Emitter::Point { position, .. } | Emitter::Spot { position, .. } | Emitter::Projector { position, .. } => {
+            LightShape::Point(position)
+        }
         // A curved one has no triangles: nothing is kept for it.
         Emitter::Area { surface } => LightShape::Area(&scene.surfaces[surface].triangles),
         Emitter::Directional { .. } | Emitter::Constant { .. } | Emitter::Envmap { .. } => LightShape::Infinite,

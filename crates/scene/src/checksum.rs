@@ -4,9 +4,9 @@ use glam::DVec3;
 use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
 
 use crate::{
-    Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes, Microfacets,
-    PerspectiveSensor, Phase, PixelRect, Pixels, ReconstructionFilter, Rgb, Roughness, Scene, Surface, Texture,
-    TextureFilter, UvTransform, Wrap,
+    Attribute, Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes,
+    Microfacets, Perturbation, Phase, PixelRect, Pixels, Projection, ReconstructionFilter, Rgb, Roughness, Scene,
+    Sensor, Slide, Surface, Texture, TextureFilter, UvTransform, Wrap,
 };
 
 impl Scene {
@@ -164,6 +164,21 @@ impl Sum {
                 self.bsdf(of);
             }
             Bsdf::Null => self.words(&[9]),
+            Bsdf::Perturbed { by, flip_invalid_normals, shadowing, of } => {
+                let scale = match by {
+                    Perturbation::Normals(_) => 0.0,
+                    Perturbation::Heights { scale, .. } => *scale,
+                };
+                let is_normals = matches!(by, Perturbation::Normals(_));
+                self.words(&[10, is_normals.into(), (*flip_invalid_normals).into(), (*shadowing).into()]);
+                self.doubles(&[scale]);
+                self.bsdf(of);
+            }
+            Bsdf::Principled(p) => {
+                self.words(&[11]);
+                self.doubles(&[p.eta]);
+            }
+            Bsdf::PrincipledThin(_) => self.words(&[12]),
         }
         // Those of nested models once more, which does no harm.
         bsdf.textures().into_iter().for_each(|texture| self.texture(texture));
@@ -203,6 +218,18 @@ impl Sum {
                 self.pixels(image);
                 self.uv_transform(to_uv);
             }
+            Texture::Attribute(attribute) => match &**attribute {
+                Attribute::Faces(values) => {
+                    self.words(&[3]);
+                    self.count(values.len());
+                    values.iter().for_each(|v| self.colour(*v));
+                }
+                Attribute::Corners(values) => {
+                    self.words(&[4]);
+                    self.count(values.len());
+                    values.iter().flatten().for_each(|v| self.colour(*v));
+                }
+            },
         }
     }
 
@@ -249,12 +276,21 @@ impl Sum {
                 self.words(&[2]);
                 self.colour(*radiance);
             }
-            Emitter::Spot { position, direction, intensity, beam, cutoff } => {
+            Emitter::Spot { position, direction, intensity, beam, cutoff, slide } => {
                 self.words(&[3]);
                 self.point(*position);
                 self.point(*direction);
                 self.colour(*intensity);
                 self.doubles(&[*beam, *cutoff]);
+                if let Some(slide) = slide {
+                    self.slide(slide);
+                }
+            }
+            Emitter::Projector { position, direction, slide } => {
+                self.words(&[6]);
+                self.point(*position);
+                self.point(*direction);
+                self.slide(slide);
             }
             Emitter::Directional { direction, irradiance } => {
                 self.words(&[4]);
@@ -269,12 +305,25 @@ impl Sum {
         }
     }
 
-    fn sensor(&mut self, sensor: &PerspectiveSensor) {
-        let PerspectiveSensor { world_from_camera, tan_half_fov_x, near_clip, far_clip, lens, medium } = sensor;
+    fn slide(&mut self, Slide { texture, scale, axes }: &Slide) {
+        self.texture(texture);
+        self.words(&[scale.to_bits()]);
+        axes.iter().for_each(|axis| self.point(*axis));
+    }
+
+    fn sensor(&mut self, Sensor { world_from_camera, projection, near_clip, far_clip, medium }: &Sensor) {
         self.doubles(&world_from_camera.to_cols_array());
-        self.doubles(&[*tan_half_fov_x, *near_clip, *far_clip]);
-        if let Some(Lens { radius, focus_distance }) = lens {
-            self.doubles(&[*radius, *focus_distance]);
+        match projection {
+            Projection::Perspective { tan_half_fov_x, lens } => {
+                self.doubles(&[*tan_half_fov_x, *near_clip, *far_clip]);
+                if let Some(Lens { radius, focus_distance }) = lens {
+                    self.doubles(&[*radius, *focus_distance]);
+                }
+            }
+            // No tangent is negative.
+            Projection::Orthographic { half_width, half_height } => {
+                self.doubles(&[-1.0, *near_clip, *far_clip, *half_width, *half_height]);
+            }
         }
         self.option(medium.map(|MediumId(n)| n));
     }

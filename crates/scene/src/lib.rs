@@ -37,15 +37,15 @@ mod source;
 mod text;
 mod texture;
 
-pub use bsdf::{Bsdf, Microfacets, Roughness};
+pub use bsdf::{Bsdf, Microfacets, Perturbation, Principled, PrincipledThin, Roughness};
 pub use error::SceneError;
 pub use load::LoadOptions;
 pub use model::{
     Boundary, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes,
-    PerspectiveSensor, Phase, PixelRect, ReconstructionFilter, Scene, Surface,
+    Phase, PixelRect, Projection, ReconstructionFilter, Scene, Sensor, Slide, Surface,
 };
 pub use source::{EmbeddedFile, SceneSource};
-pub use texture::{Pixels, Texture, TextureFilter, UvTransform, Wrap, luminance};
+pub use texture::{Attribute, Pixels, Texture, TextureFilter, TexturePoint, UvTransform, Wrap, luminance};
 
 /// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.
 pub type Rgb = glam::Vec3;

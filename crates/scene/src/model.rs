@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use vdf_geometry::{CurvedShape, Triangle};
 
-use crate::{Bsdf, Pixels, Rgb};
+use crate::{Bsdf, Pixels, Rgb, Texture};
 
 /// Index into [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub struct Scene {
     /// The emitters, in the order of the file.
     pub emitters: Vec<Emitter>,
     /// The camera.
-    pub sensor: PerspectiveSensor,
+    pub sensor: Sensor,
     /// The image plane.
     pub film: FilmSettings,
     /// Path depth limits.
@@ -119,6 +119,17 @@ pub enum Emitter {
         beam: f64,
         /// Half the angle beyond which there is no light, in radians; not less than `beam`.
         cutoff: f64,
+        /// A picture that the cone is coloured with.
+        slide: Option<Box<Slide>>,
+    },
+    /// A point that throws a picture.
+    Projector {
+        /// Position in world units.
+        position: DVec3,
+        /// Unit vector, to the middle of the picture.
+        direction: DVec3,
+        /// The picture; its colours times π are the irradiance of a plane at right angles to `direction`, one unit away.
+        slide: Box<Slide>,
     },
     /// Parallel light from infinitely far away.
     Directional {
@@ -148,21 +159,87 @@ pub enum Emitter {
     },
 }
 
-/// A camera with a pinhole or a thin lens.
+/// A picture that a light throws. Texture coordinates of a direction d are 1/2 + (a·d)/(c·d)/2 and 1/2 + (b·d)/(c·d)/2, where c is where the light shines to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slide {
+    /// The picture.
+    pub texture: Texture,
+    /// What its colours are multiplied with; at least 0.
+    pub scale: f32,
+    /// The vectors a and b.
+    pub axes: [DVec3; 2],
+}
+
+impl Emitter {
+    /// Where it is, if it is a point.
+    #[must_use]
+    pub const fn position(&self) -> Option<DVec3> {
+        match *self {
+            Self::Point { position, .. } | Self::Spot { position, .. } | Self::Projector { position, .. } => {
+                Some(position)
+            }
+            Self::Directional { .. } | Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => None,
+        }
+    }
+}
+
+/// A camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PerspectiveSensor {
+pub struct Sensor {
     /// Camera to world: +X is left in the image, +Y up, +Z forward; a rigid transform.
     pub world_from_camera: DMat4,
-    /// tan(X/2), where X is the horizontal field of view of the full film; positive.
-    pub tan_half_fov_x: f64,
+    /// Which rays belong to a place of the film.
+    pub projection: Projection,
     /// Rays start on this plane, in world units along +Z.
     pub near_clip: f64,
     /// Rays end on this plane, in world units along +Z.
     pub far_clip: f64,
-    /// The lens, if it is no pinhole.
-    pub lens: Option<Lens>,
     /// The medium around the camera; `None` is vacuum.
     pub medium: Option<MediumId>,
+}
+
+/// Which rays belong to a place of the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Those through the camera's place, or through its lens.
+    Perspective {
+        /// tan(X/2), where X is the horizontal field of view of the full film; positive.
+        tan_half_fov_x: f64,
+        /// The lens, if it is no pinhole.
+        lens: Option<Lens>,
+    },
+    /// Parallel ones along +Z.
+    Orthographic {
+        /// Half the width of what the full film sees, in world units; positive.
+        half_width: f64,
+        /// Half its height; positive.
+        half_height: f64,
+    },
+}
+
+impl Sensor {
+    /// The ray through a place of the full film, in the space of the camera: its point at depth 0 and how far it goes for each unit of depth, from the middle of the
+    /// lens if there is one. `x` and `y` are from −1 to 1, +X left and +Y up; `aspect` is the width of the film over its height.
+    #[must_use]
+    pub fn ray(&self, x: f64, y: f64, aspect: f64) -> (DVec3, DVec3) {
+        match self.projection {
+            Projection::Perspective { tan_half_fov_x: t, .. } => (DVec3::ZERO, DVec3::new(x * t, y * t / aspect, 1.0)),
+            Projection::Orthographic { half_width, half_height } => {
+                (DVec3::new(x * half_width, y * half_height, 0.0), DVec3::Z)
+            }
+        }
+    }
+
+    /// Points whose hull holds the points of all rays at depth 0: the camera's place or, if rays are parallel, the corners of the film.
+    #[must_use]
+    pub fn origins(&self) -> [DVec3; 4] {
+        let (w, h) = match self.projection {
+            Projection::Perspective { .. } => (0.0, 0.0),
+            Projection::Orthographic { half_width, half_height } => (half_width, half_height),
+        };
+        [(-w, -h), (w, -h), (-w, h), (w, h)]
+            .map(|(x, y)| self.world_from_camera.transform_point3(DVec3::new(x, y, 0.0)))
+    }
 }
 
 /// A thin lens.

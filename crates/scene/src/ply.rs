@@ -1,15 +1,18 @@
 //! PLY meshes (Turk 1994): text, or binary numbers in either order.
 //!
-//! Of the element `vertex` the properties x, y, z, nx, ny, nz and u, v (or s, t) are read, of `face` the list `vertex_indices` (or `vertex_index`); all
-//! others are passed over. Polygons become fans, as in most loaders.
+//! Of the element `vertex` the properties x, y, z, nx, ny, nz and u, v (or s, t, or texture_u, texture_v) are read, of `face` the list `vertex_indices` (or
+//! `vertex_index`), and of both the attributes that Mitsuba knows; all others are passed over. Polygons become fans, as in most loaders.
 //!
 //! *Limits.* Nothing is allocated because a header says so: memory grows with what is read.
+
+mod attributes;
 
 use std::io::{BufRead, Read as _};
 
 use glam::{DVec3, Vec2};
 
-use crate::mesh::{Mesh, MeshError};
+use crate::Rgb;
+use crate::mesh::{Mesh, MeshError, NamedValues};
 
 /// A header has at most this many lines, each at most this long; an element at most this many properties.
 const MOST_LINES: u64 = 10_000;
@@ -292,11 +295,13 @@ fn vertices(body: &mut Body<'_>, element: &ElementKind, mesh: &mut Mesh, most: u
         "nx" => Some(3),
         "ny" => Some(4),
         "nz" => Some(5),
-        "u" | "s" => Some(6),
-        "v" | "t" => Some(7),
+        "u" | "s" | "texture_u" => Some(6),
+        "v" | "t" | "texture_v" => Some(7),
         _ => None,
     };
     let slots: Vec<Option<usize>> = element.properties.iter().map(slot).collect();
+    let groups = attributes::groups(&element.properties);
+    let mut others = Others::new(&groups, "vertex_", mesh);
     let has = |wanted: &[usize]| wanted.iter().all(|w| slots.contains(&Some(*w)));
     if !has(&[0, 1, 2]) {
         return Err(MeshError::of_file("the vertices have no x, y and z", ""));
@@ -305,12 +310,15 @@ fn vertices(body: &mut Body<'_>, element: &ElementKind, mesh: &mut Mesh, most: u
     for _ in 0..element.count {
         body.begin()?;
         let mut values = [0.0; 8];
-        for (property, slot) in element.properties.iter().zip(&slots) {
+        others.begin();
+        for (i, (property, slot)) in element.properties.iter().zip(&slots).enumerate() {
             match slot {
                 Some(slot) => values[*slot] = body.number(property.number)?,
+                None if others.wants(i) => others.take(i, body.number(property.number)?),
                 None => body.skip_property(property)?,
             }
         }
+        others.push(mesh, 1);
         let [x, y, z, nx, ny, nz, u, v] = values;
         if !values.iter().all(|v| v.is_finite()) {
             let message = format!("vertex {} has a number that is not finite", mesh.positions.len());
@@ -332,12 +340,20 @@ fn faces(body: &mut Body<'_>, element: &ElementKind, mesh: &mut Mesh, most: usiz
     if element.count > 0 && !element.properties.iter().any(is_corners) {
         return Err(MeshError::of_file("the faces have no list \"vertex_indices\"", ""));
     }
+    let groups = attributes::groups(&element.properties);
+    let mut others = Others::new(&groups, "face_", mesh);
     let mut corners = Vec::new();
     for _ in 0..element.count {
         body.begin()?;
-        for property in &element.properties {
+        others.begin();
+        let before = mesh.triangles.len();
+        for (i, property) in element.properties.iter().enumerate() {
             let Some(length) = property.length.filter(|_| is_corners(property)) else {
-                body.skip_property(property)?;
+                if others.wants(i) {
+                    others.take(i, body.number(property.number)?);
+                } else {
+                    body.skip_property(property)?;
+                }
                 continue;
             };
             corners.clear();
@@ -358,8 +374,62 @@ fn faces(body: &mut Body<'_>, element: &ElementKind, mesh: &mut Mesh, most: usiz
                 return Err(MeshError::of_file(format!("more than {most} triangles"), ""));
             }
         }
+        others.push(mesh, mesh.triangles.len() - before);
     }
     Ok(())
+}
+
+/// The attributes of an element while its rows are read.
+struct Others {
+    /// Where each property goes: the attribute and its channel.
+    slots: Vec<Option<(usize, usize)>>,
+    /// How many channels each attribute has.
+    channels: Vec<usize>,
+    /// Of the row that is being read.
+    row: Vec<[f64; 3]>,
+    /// The number of the first attribute in the mesh.
+    first: usize,
+}
+
+impl Others {
+    fn new(groups: &[attributes::Group], prefix: &str, mesh: &mut Mesh) -> Self {
+        let first = mesh.attributes.len();
+        let mut slots = Vec::new();
+        for (attribute, group) in groups.iter().enumerate() {
+            for (channel, &property) in group.properties.iter().enumerate() {
+                slots.resize(slots.len().max(property + 1), None);
+                slots[property] = Some((attribute, channel));
+            }
+            let name = format!("{prefix}{}", group.name);
+            mesh.attributes.push(NamedValues { name, values: Vec::new(), of_faces: prefix == "face_" });
+        }
+        let channels = groups.iter().map(|g| g.properties.len()).collect();
+        Self { slots, channels, row: vec![[0.0; 3]; groups.len()], first }
+    }
+
+    fn wants(&self, property: usize) -> bool {
+        self.slots.get(property).is_some_and(Option::is_some)
+    }
+
+    fn begin(&mut self) {
+        self.row.fill([0.0; 3]);
+    }
+
+    fn take(&mut self, property: usize, value: f64) {
+        if let Some(Some((attribute, channel))) = self.slots.get(property) {
+            self.row[*attribute][*channel] = value;
+        }
+    }
+
+    /// The row is one of so many vertices or triangles.
+    fn push(&self, mesh: &mut Mesh, count: usize) {
+        for ((attribute, row), channels) in mesh.attributes[self.first..].iter_mut().zip(&self.row).zip(&self.channels)
+        {
+            let [r, g, b] = row.map(|v| v as f32);
+            let value = if *channels == 1 { Rgb::splat(r) } else { Rgb::new(r, g, b) };
+            attribute.values.extend(std::iter::repeat_n(value, count));
+        }
+    }
 }
 
 #[cfg(test)]

@@ -17,6 +17,32 @@ pub struct Pixels {
     pub rgb: Vec<Rgb>,
 }
 
+/// Where on a surface a texture is looked up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TexturePoint {
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// The number of the triangle in its surface; 0 where there are none.
+    pub triangle: u32,
+    /// The barycentric weights of its second and third corner.
+    pub barycentric: [f32; 2],
+}
+
+impl From<Vec2> for TexturePoint {
+    fn from(uv: Vec2) -> Self {
+        Self { uv, ..Self::default() }
+    }
+}
+
+/// Colours that a mesh carries beside its texture coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Attribute {
+    /// One for each triangle.
+    Faces(Vec<Rgb>),
+    /// One for each corner of each triangle, linear between them.
+    Corners(Vec<[Rgb; 3]>),
+}
+
 /// A colour over a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Texture {
@@ -42,6 +68,8 @@ pub enum Texture {
         /// What becomes of texture coordinates before.
         to_uv: UvTransform,
     },
+    /// What the mesh itself says.
+    Attribute(Arc<Attribute>),
 }
 
 /// What is between the middles of pixels.
@@ -86,6 +114,14 @@ impl UvTransform {
     fn apply(&self, uv: DVec2) -> DVec2 {
         self.columns[0] * uv.x + self.columns[1] * uv.y + self.offset
     }
+
+    /// Whether a point is in the first or the last of the 2 × 2 fields of the unit square, which goes on for ever.
+    #[inline]
+    fn is_on_diagonal(&self, uv: Vec2) -> bool {
+        let p = self.apply(uv.as_dvec2());
+        let right = p - p.floor();
+        (right.x > 0.5) == (right.y > 0.5)
+    }
 }
 
 impl Default for Texture {
@@ -110,24 +146,43 @@ impl Texture {
         }
     }
 
-    /// The colour at texture coordinates.
+    /// The colour at a point.
     #[must_use]
-    pub fn at(&self, uv: Vec2) -> Rgb {
+    pub fn at(&self, point: &TexturePoint) -> Rgb {
         match self {
             Self::Constant(colour) => *colour,
             Self::Checkerboard { first, second, to_uv } => {
-                let p = to_uv.apply(uv.as_dvec2());
-                let right = p - p.floor();
-                if (right.x > 0.5) == (right.y > 0.5) { first.at(uv) } else { second.at(uv) }
+                if to_uv.is_on_diagonal(point.uv) {
+                    first.at(point)
+                } else {
+                    second.at(point)
+                }
             }
-            Self::Bitmap { image, filter, wrap, to_uv } => image.at(to_uv.apply(uv.as_dvec2()), *filter, *wrap),
+            Self::Bitmap { image, filter, wrap, to_uv } => image.at(to_uv.apply(point.uv.as_dvec2()), *filter, *wrap),
+            Self::Attribute(attribute) => attribute.at(point),
         }
     }
 
-    /// The luminance at texture coordinates.
+    /// The luminance at a point, where a single number is asked for: an opacity, a weight, a roughness. A checkerboard has its two colours in each other's place then,
+    /// as in Mitsuba 3.9.1.
     #[must_use]
-    pub fn luminance_at(&self, uv: Vec2) -> f32 {
-        luminance(self.at(uv))
+    pub fn luminance_at(&self, point: &TexturePoint) -> f32 {
+        match self {
+            Self::Checkerboard { first, second, to_uv } => {
+                let field = if to_uv.is_on_diagonal(point.uv) { second } else { first };
+                field.luminance_at(point)
+            }
+            _ => luminance(self.at(point)),
+        }
+    }
+
+    /// How fast the luminance grows with u and with v. Zero for all but pictures with [`TextureFilter::Bilinear`]: nothing else changes but by jumps.
+    #[must_use]
+    pub fn luminance_gradient(&self, point: &TexturePoint) -> DVec2 {
+        let Self::Bitmap { image, filter: TextureFilter::Bilinear, wrap, to_uv } = self else { return DVec2::ZERO };
+        let gradient = image.luminance_gradient(to_uv.apply(point.uv.as_dvec2()), *wrap);
+        // The chain rule: the map's columns are ∂(x, y)/∂u and ∂(x, y)/∂v.
+        DVec2::from_array(to_uv.columns.map(|column| column.dot(gradient)))
     }
 
     /// The mean colour over the unit square.
@@ -140,6 +195,30 @@ impl Texture {
                 let sum = image.rgb.iter().fold(glam::DVec3::ZERO, |sum, p| sum + p.as_dvec3());
                 (sum / image.rgb.len().max(1) as f64).as_vec3()
             }
+            Self::Attribute(attribute) => attribute.mean(),
+        }
+    }
+}
+
+impl Attribute {
+    fn at(&self, point: &TexturePoint) -> Rgb {
+        match self {
+            Self::Faces(values) => values.get(point.triangle as usize).copied().unwrap_or_default(),
+            Self::Corners(values) => {
+                let [a, b, c] = values.get(point.triangle as usize).copied().unwrap_or_default();
+                let [wb, wc] = point.barycentric;
+                // A hit's weights may be rounded below zero.
+                (a * (1.0 - wb - wc) + b * wb + c * wc).max(Rgb::ZERO)
+            }
+        }
+    }
+
+    /// The mean over the triangles, as if they were of equal size.
+    fn mean(&self) -> Rgb {
+        let mean = |sum: glam::DVec3, count: usize| (sum / count.max(1) as f64).as_vec3();
+        match self {
+            Self::Faces(values) => mean(values.iter().map(|v| v.as_dvec3()).sum(), values.len()),
+            Self::Corners(values) => mean(values.iter().flatten().map(|v| v.as_dvec3()).sum(), 3 * values.len()),
         }
     }
 }
@@ -172,10 +251,28 @@ impl Pixels {
         self.rgb.get((y * i64::from(self.width) + x) as usize).copied().unwrap_or_default()
     }
 
-    fn at(&self, uv: DVec2, filter: TextureFilter, wrap: Wrap) -> Rgb {
+    /// A place in pixels.
+    #[inline]
+    fn place(&self, uv: DVec2) -> (f64, f64) {
         // Far outside nothing but the fraction counts, and no conversion may saturate.
         let place = |x: f64, n: u32| if x.is_finite() { x.clamp(-1e9, 1e9) * f64::from(n) } else { 0.0 };
-        let (x, y) = (place(uv.x, self.width), place(uv.y, self.height));
+        (place(uv.x, self.width), place(uv.y, self.height))
+    }
+
+    /// How fast the luminance grows over the width and over the height of the picture, where it is linear between pixels.
+    fn luminance_gradient(&self, uv: DVec2, wrap: Wrap) -> DVec2 {
+        let (x, y) = self.place(uv);
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (i, j) = (x.floor() as i64, y.floor() as i64);
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let at = |x, y| f64::from(luminance(self.pixel(x, y, wrap)));
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+        let by_pixel = DVec2::new((b - a) * (1.0 - fy) + (d - c) * fy, (c - a) * (1.0 - fx) + (d - b) * fx);
+        by_pixel * DVec2::new(self.width.into(), self.height.into())
+    }
+
+    fn at(&self, uv: DVec2, filter: TextureFilter, wrap: Wrap) -> Rgb {
+        let (x, y) = self.place(uv);
         match filter {
             TextureFilter::Nearest => self.pixel(x.floor() as i64, y.floor() as i64, wrap),
             TextureFilter::Bilinear => {
@@ -203,7 +300,7 @@ mod tests {
     #[test]
     fn pixels_lie_as_in_mitsuba() {
         let texture = |filter, wrap| Texture::Bitmap { image: picture(), filter, wrap, to_uv: UvTransform::default() };
-        let at = |t: &Texture, u: f32, v: f32| t.at(Vec2::new(u, v)).x;
+        let at = |t: &Texture, u: f32, v: f32| t.at(&Vec2::new(u, v).into()).x;
         let nearest = texture(TextureFilter::Nearest, Wrap::Repeat);
         assert_eq!([at(&nearest, 0.2, 0.2), at(&nearest, 0.7, 0.2), at(&nearest, 0.2, 0.7)], [1.0, 2.0, 3.0]);
         assert_eq!([at(&nearest, 1.2, -0.3), at(&nearest, -0.2, 0.2)], [3.0, 2.0]);
@@ -220,6 +317,48 @@ mod tests {
         assert_eq!(smooth.mean(), Rgb::splat(2.5));
     }
 
+    /// The gradient is what the values grow by, also through a map that turns and where the picture begins again.
+    #[test]
+    fn gradients_are_differences() {
+        let to_uv =
+            UvTransform { columns: [DVec2::new(0.6, 1.1), DVec2::new(-0.8, 0.9)], offset: DVec2::new(0.2, -0.7) };
+        let rgb = (0..15).map(|i| Rgb::new((i * 7 % 5) as f32, (i % 4) as f32, (i * i % 7) as f32)).collect();
+        let image = Arc::new(Pixels { width: 5, height: 3, rgb });
+        let picture = |filter, wrap| Texture::Bitmap { image: image.clone(), filter, wrap, to_uv };
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            let texture = picture(TextureFilter::Bilinear, wrap);
+            let value = |p: DVec2| f64::from(texture.luminance_at(&p.as_vec2().into()));
+            let mut compared = 0;
+            for i in 0..100 {
+                let p = DVec2::new(f64::from(i) * 0.0371 - 1.5, f64::from(i * i % 97) * 0.0293);
+                let h = 1.0 / 256.0;
+                let gradient = texture.luminance_gradient(&p.as_vec2().into());
+                // Where the differences to both sides differ a border of pixels is near.
+                for (axis, got) in [(DVec2::X * h, gradient.x), (DVec2::Y * h, gradient.y)] {
+                    let (left, right) = ((value(p) - value(p - axis)) / h, (value(p + axis) - value(p)) / h);
+                    if (left - right).abs() < 0.3 {
+                        compared += 1;
+                        assert!((got - 0.5 * (left + right)).abs() < 0.3, "{wrap:?} {p}: {got}, {left}, {right}");
+                    }
+                }
+            }
+            assert!(compared > 120, "{wrap:?} {compared}");
+            assert_eq!(picture(TextureFilter::Nearest, wrap).luminance_gradient(&Vec2::ONE.into()), DVec2::ZERO);
+        }
+    }
+
+    #[test]
+    fn attributes_are_linear_in_triangles_or_equal_in_each() {
+        let point = TexturePoint { triangle: 1, barycentric: [0.25, 0.5], ..TexturePoint::default() };
+        let corners = [[Rgb::ZERO; 3], [Rgb::splat(4.0), Rgb::splat(8.0), Rgb::ZERO]].to_vec();
+        let texture = Texture::Attribute(Arc::new(Attribute::Corners(corners)));
+        assert_eq!((texture.at(&point), texture.mean()), (Rgb::splat(3.0), Rgb::splat(2.0)));
+        let texture = Texture::Attribute(Arc::new(Attribute::Faces([Rgb::ZERO, Rgb::X].to_vec())));
+        assert_eq!((texture.at(&point), texture.mean()), (Rgb::X, Rgb::X * 0.5));
+        let beyond = TexturePoint { triangle: 2, ..point };
+        assert_eq!(texture.at(&beyond), Rgb::ZERO);
+    }
+
     #[test]
     fn a_checkerboard_has_four_fields() {
         let to_uv = UvTransform { columns: [DVec2::X * 2.0, DVec2::Y], offset: DVec2::ZERO };
@@ -228,10 +367,13 @@ mod tests {
             second: Box::new(Texture::grey(0.2)),
             to_uv,
         };
-        let at = |t: &Texture, u: f32, v: f32| t.at(Vec2::new(u, v)).x;
+        let at = |t: &Texture, u: f32, v: f32| t.at(&Vec2::new(u, v).into()).x;
         let plain = board(UvTransform::default());
         assert_eq!([at(&plain, 0.25, 0.25), at(&plain, 0.75, 0.25), at(&plain, 0.75, 0.75)], [0.4, 0.2, 0.4]);
         assert_eq!([at(&board(to_uv), 0.3, 0.25), at(&board(to_uv), 0.6, 0.25)], [0.2, 0.4]);
         assert!((plain.mean().x - 0.3).abs() < 1e-7);
+        // Mitsuba 3.9.1 looks single numbers up in the other two fields.
+        let number = |u: f32, v: f32| plain.luminance_at(&Vec2::new(u, v).into());
+        assert!((number(0.25, 0.25) - 0.2).abs() < 1e-6 && (number(0.75, 0.25) - 0.4).abs() < 1e-6);
     }
 }

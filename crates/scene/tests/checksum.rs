@@ -4,9 +4,10 @@ use std::collections::HashSet;
 
 use std::sync::Arc;
 
-use glam::{DMat4, Vec3};
+use glam::{DMat4, DVec3, Vec3};
 use vdf_scene::{
-    Bsdf, Emitter, Lens, LoadOptions, MeshAttributes, Phase, Pixels, ReconstructionFilter, Rgb, Scene, Texture,
+    Attribute, Bsdf, Emitter, Lens, LoadOptions, MeshAttributes, Perturbation, Phase, Pixels, Projection,
+    ReconstructionFilter, Rgb, Scene, Slide, Texture,
 };
 use vdf_scenes::builtin;
 
@@ -14,6 +15,15 @@ fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
     let defines = defines.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
     Scene::from_source(&builtin(name).expect("it is built in"), &LoadOptions { defines, sensor: None })
         .expect("it loads")
+}
+
+fn turned(by: Perturbation, flip_invalid_normals: bool, shadowing: bool) -> Bsdf {
+    Bsdf::Perturbed { by, flip_invalid_normals, shadowing, of: Box::new(Bsdf::Null) }
+}
+
+fn projector(scale: f32) -> Emitter {
+    let slide = Box::new(Slide { texture: Texture::grey(1.0), scale, axes: [DVec3::X, DVec3::Y] });
+    Emitter::Projector { position: DVec3::ZERO, direction: DVec3::Z, slide }
 }
 
 #[test]
@@ -26,7 +36,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         change(&mut changed);
         assert_eq!(changed.checksum(), scene.checksum());
     }
-    let other: [fn(&mut Scene); 23] = [
+    let other: [fn(&mut Scene); 34] = [
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
@@ -39,7 +49,9 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.media[0].sigma_t *= 1.5,
         |s| s.media[0].phase = Phase::HenyeyGreenstein { g: 0.0 },
         |s| s.emitters.reverse(),
-        |s| s.sensor.tan_half_fov_x *= 1.5,
+        |s| s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens: None },
+        |s| s.sensor.projection = Projection::Orthographic { half_width: 1.5, half_height: 1.0 },
+        |s| s.sensor.projection = Projection::Orthographic { half_width: 1.0, half_height: 1.5 },
         |s| s.sensor.world_from_camera.w_axis.x += 1.0,
         |s| s.film.width += 1,
         |s| s.film.filter = ReconstructionFilter::Gaussian { stddev: 0.625 },
@@ -47,7 +59,25 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.surfaces[0].bsdf = Bsdf::Diffuse { reflectance: Texture::grey(0.125) },
         |s| s.surfaces[0].bsdf = Bsdf::Null,
         |s| s.surfaces[0].attributes = Arc::new(MeshAttributes { normals: vec![[Vec3::X; 3]], uvs: vec![] }),
-        |s| s.sensor.lens = Some(Lens { radius: 1.0, focus_distance: 2.0 }),
+        |s| {
+            let lens = Some(Lens { radius: 1.0, focus_distance: 2.0 });
+            s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens };
+        },
+        |s| s.surfaces[0].bsdf = turned(Perturbation::Normals(Texture::grey(0.5)), true, true),
+        |s| s.surfaces[0].bsdf = turned(Perturbation::Heights { texture: Texture::grey(0.5), scale: 0.0 }, true, true),
+        |s| s.surfaces[0].bsdf = turned(Perturbation::Heights { texture: Texture::grey(0.5), scale: 2.0 }, true, true),
+        |s| s.surfaces[0].bsdf = turned(Perturbation::Normals(Texture::grey(0.5)), false, true),
+        |s| s.surfaces[0].bsdf = turned(Perturbation::Normals(Texture::grey(0.5)), true, false),
+        |s| {
+            s.surfaces[0].bsdf =
+                Bsdf::Diffuse { reflectance: Texture::Attribute(Arc::new(Attribute::Faces(vec![Rgb::ONE; 3]))) }
+        },
+        |s| {
+            let corners = Attribute::Corners(vec![[Rgb::ONE; 3]]);
+            s.surfaces[0].bsdf = Bsdf::Diffuse { reflectance: Texture::Attribute(Arc::new(corners)) };
+        },
+        |s| s.emitters.push(projector(1.0)),
+        |s| s.emitters.push(projector(2.0)),
         |s| s.emitters.push(Emitter::Directional { direction: glam::DVec3::X, irradiance: Rgb::ONE }),
         |s| {
             let image = Arc::new(Pixels { width: 2, height: 2, rgb: vec![Rgb::ONE; 4] });

@@ -4,8 +4,8 @@ use glam::{DMat4, DVec3, Vec3};
 use vdf_geometry::{Segment, Triangle};
 use vdf_render::World;
 use vdf_scene::{
-    Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, PerspectiveSensor, PixelRect,
-    ReconstructionFilter, Rgb, Surface,
+    Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, PixelRect, Projection, ReconstructionFilter, Rgb,
+    Sensor, Surface,
 };
 use vdf_visibility::VisibilityError;
 
@@ -28,12 +28,11 @@ fn scene() -> Scene {
         boundaries: vec![],
         media: vec![],
         emitters: [0.0, 1.0].map(|x| Emitter::Point { position: DVec3::splat(x), intensity: white }).to_vec(),
-        sensor: PerspectiveSensor {
+        sensor: Sensor {
             world_from_camera: DMat4::IDENTITY,
-            tan_half_fov_x: 1.0,
+            projection: Projection::Perspective { tan_half_fov_x: 1.0, lens: None },
             near_clip: 0.1,
             far_clip: 10.0,
-            lens: None,
             medium: None,
         },
         film: FilmSettings {

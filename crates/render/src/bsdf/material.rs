@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec2, dvec3};
-use vdf_scene::{Bsdf, Rgb, Roughness, Texture};
+use glam::{DVec3, dvec3};
+use vdf_scene::{Bsdf, Perturbation, Principled, PrincipledThin, Rgb, Roughness, Texture, TexturePoint};
 
-use super::{fresnel, microfacet::Facets, plastic::Coat};
+use super::{fresnel, microfacet::Facets, perturbed::Perturbed, plastic::Coat, principled, principled_thin};
 use crate::frame::sample_cosine_hemisphere;
 
 /// Smoother surfaces are drawn as rough as this, as in Mitsuba.
@@ -22,7 +22,26 @@ pub(crate) enum Material {
     TwoSided(Box<[Material; 2]>),
     Blend { weight: Texture, of: Box<[Material; 2]> },
     Mask { opacity: Texture, of: Box<Material> },
+    Perturbed(Box<Perturbed>),
+    Principled(Box<Principled>),
+    PrincipledThin(Box<PrincipledThin>),
     Null,
+}
+
+/// A point of a surface as materials see it. Vectors are in the shading frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaterialPoint {
+    pub(crate) texture: TexturePoint,
+    /// ∂p/∂u and ∂p/∂v; zero unless [`Material::needs_tangents`].
+    pub(crate) tangents: [DVec3; 2],
+    /// The normal of the surface itself, on the side of the shading normal.
+    pub(crate) normal: DVec3,
+}
+
+impl From<TexturePoint> for MaterialPoint {
+    fn from(texture: TexturePoint) -> Self {
+        Self { texture, tangents: [DVec3::ZERO; 2], normal: DVec3::Z }
+    }
 }
 
 /// What kind of lobe a direction was drawn from.
@@ -49,7 +68,7 @@ pub(crate) struct MaterialSample {
     pub(crate) lobe: Lobe,
 }
 
-const BLACK: (Rgb, f64) = (Rgb::ZERO, 0.0);
+pub(super) const BLACK: (Rgb, f64) = (Rgb::ZERO, 0.0);
 
 impl From<&Bsdf> for Material {
     fn from(bsdf: &Bsdf) -> Self {
@@ -86,13 +105,21 @@ impl From<&Bsdf> for Material {
                 Self::Blend { weight: weight.clone(), of: Box::new([(&of[0]).into(), (&of[1]).into()]) }
             }
             Bsdf::Mask { opacity, of } => Self::Mask { opacity: opacity.clone(), of: Box::new(of.as_ref().into()) },
+            Bsdf::Perturbed { by, flip_invalid_normals, shadowing, of } => Self::Perturbed(Box::new(Perturbed {
+                by: by.clone(),
+                flip_invalid_normals: *flip_invalid_normals,
+                shadowing: *shadowing,
+                of: of.as_ref().into(),
+            })),
+            Bsdf::Principled(p) => Self::Principled(p.clone()),
+            Bsdf::PrincipledThin(p) => Self::PrincipledThin(p.clone()),
             Bsdf::Null => Self::Null,
         }
     }
 }
 
-fn facets(roughness: &Roughness, uv: Vec2) -> Facets {
-    let alpha = |t: &Texture| f64::from(t.luminance_at(uv)).max(LEAST_ALPHA);
+fn facets(roughness: &Roughness, at: &MaterialPoint) -> Facets {
+    let alpha = |t: &Texture| f64::from(t.luminance_at(&at.texture)).max(LEAST_ALPHA);
     Facets { kind: roughness.distribution, alpha: [alpha(&roughness.alpha_u), alpha(&roughness.alpha_v)] }
 }
 
@@ -106,6 +133,7 @@ impl Material {
         match self {
             Self::ThinDielectric { .. } | Self::Mask { .. } | Self::Null => true,
             Self::Blend { of, .. } => of.iter().any(Self::may_pass),
+            Self::Perturbed(p) => p.of.may_pass(),
             _ => false,
         }
     }
@@ -117,31 +145,43 @@ impl Material {
             Self::ThinDielectric { .. } | Self::Null => false,
             Self::TwoSided(of) | Self::Blend { of, .. } => of.iter().any(Self::has_smooth_lobes),
             Self::Mask { of, .. } => of.has_smooth_lobes(),
-            Self::Diffuse { .. } | Self::Plastic { .. } => true,
+            Self::Perturbed(p) => p.of.has_smooth_lobes(),
+            Self::Diffuse { .. } | Self::Plastic { .. } | Self::Principled(_) | Self::PrincipledThin(_) => true,
+        }
+    }
+
+    /// Whether it asks how a point moves with the texture coordinates.
+    pub(crate) fn needs_tangents(&self) -> bool {
+        match self {
+            Self::TwoSided(of) | Self::Blend { of, .. } => of.iter().any(Self::needs_tangents),
+            Self::Mask { of, .. } => of.needs_tangents(),
+            Self::Perturbed(p) => p.of.needs_tangents() || matches!(p.by, Perturbation::Heights { .. }),
+            _ => false,
         }
     }
 
     /// What of light goes straight through.
-    pub(crate) fn passes(&self, wi: DVec3, uv: Vec2) -> Rgb {
+    pub(crate) fn passes(&self, wi: DVec3, at: &MaterialPoint) -> Rgb {
         match self {
             Self::ThinDielectric { eta, transmittance, .. } => {
-                transmittance.at(uv) * (1.0 - thin_reflectance(wi.z, *eta)) as f32
+                transmittance.at(&at.texture) * (1.0 - thin_reflectance(wi.z, *eta)) as f32
             }
             Self::Mask { opacity, of } => {
-                let opacity = opacity.luminance_at(uv).clamp(0.0, 1.0);
-                of.passes(wi, uv) * opacity + Rgb::splat(1.0 - opacity)
+                let opacity = opacity.luminance_at(&at.texture).clamp(0.0, 1.0);
+                of.passes(wi, at) * opacity + Rgb::splat(1.0 - opacity)
             }
             Self::Blend { weight, of } => {
-                let weight = weight.luminance_at(uv).clamp(0.0, 1.0);
-                of[0].passes(wi, uv) * (1.0 - weight) + of[1].passes(wi, uv) * weight
+                let weight = weight.luminance_at(&at.texture).clamp(0.0, 1.0);
+                of[0].passes(wi, at) * (1.0 - weight) + of[1].passes(wi, at) * weight
             }
+            Self::Perturbed(p) => p.passes(wi, at),
             Self::Null => Rgb::ONE,
             _ => Rgb::ZERO,
         }
     }
 
     /// BSDF times cosine of the lobes that have a density, and the density with which [`Material::sample`] draws `wo` from these.
-    pub(crate) fn eval(&self, wi: DVec3, wo: DVec3, uv: Vec2) -> (Rgb, f64) {
+    pub(crate) fn eval(&self, wi: DVec3, wo: DVec3, at: &MaterialPoint) -> (Rgb, f64) {
         match self {
             Self::Diffuse { front, back } => {
                 let reflectance = if wi.z > 0.0 { front } else { back };
@@ -149,14 +189,14 @@ impl Material {
                     return BLACK;
                 }
                 let pdf = wo.z.abs() / PI;
-                (reflectance.at(uv) * pdf as f32, pdf)
+                (reflectance.at(&at.texture) * pdf as f32, pdf)
             }
             Self::Conductor { eta, k, specular, roughness: Some(roughness) } => {
-                let Some((value, pdf, cos)) = reflection(&facets(roughness, uv), wi, wo) else { return BLACK };
-                (specular.at(uv) * fresnel::conductor(cos, *eta, *k) * value as f32, pdf)
+                let Some((value, pdf, cos)) = reflection(&facets(roughness, at), wi, wo) else { return BLACK };
+                (specular.at(&at.texture) * fresnel::conductor(cos, *eta, *k) * value as f32, pdf)
             }
             Self::Dielectric { eta, reflectance, transmittance, roughness: Some(roughness) } => {
-                rough_dielectric(*eta, reflectance, transmittance, &facets(roughness, uv), wi, wo, uv)
+                rough_dielectric(*eta, reflectance, transmittance, &facets(roughness, at), wi, wo, at)
             }
             Self::Plastic { coat, diffuse, specular, nonlinear, roughness } => {
                 if wi.z <= 0.0 || wo.z <= 0.0 {
@@ -164,42 +204,45 @@ impl Material {
                 }
                 let choice = coat.choice(wi.z);
                 let mut pdf = (1.0 - choice) * wo.z / PI;
-                let mut value = coat.base(diffuse.at(uv), *nonlinear, wi.z, wo.z) * (wo.z / PI) as f32;
-                let shine = roughness.as_ref().and_then(|r| reflection(&facets(r, uv), wi, wo));
+                let mut value = coat.base(diffuse.at(&at.texture), *nonlinear, wi.z, wo.z) * (wo.z / PI) as f32;
+                let shine = roughness.as_ref().and_then(|r| reflection(&facets(r, at), wi, wo));
                 if let Some((d, pdf_coat, cos)) = shine {
-                    value += specular.at(uv) * (fresnel::dielectric(cos, coat.eta).reflected * d) as f32;
+                    value += specular.at(&at.texture) * (fresnel::dielectric(cos, coat.eta).reflected * d) as f32;
                     pdf += choice * pdf_coat;
                 }
                 (value, pdf)
             }
             Self::TwoSided(of) => {
                 if wi.z > 0.0 {
-                    of[0].eval(wi, wo, uv)
+                    of[0].eval(wi, wo, at)
                 } else {
-                    of[1].eval(upside_down(wi), upside_down(wo), uv)
+                    of[1].eval(upside_down(wi), upside_down(wo), at)
                 }
             }
             Self::Blend { weight, of } => {
-                let weight = weight.luminance_at(uv).clamp(0.0, 1.0);
-                let ((a, pdf_a), (b, pdf_b)) = (of[0].eval(wi, wo, uv), of[1].eval(wi, wo, uv));
+                let weight = weight.luminance_at(&at.texture).clamp(0.0, 1.0);
+                let ((a, pdf_a), (b, pdf_b)) = (of[0].eval(wi, wo, at), of[1].eval(wi, wo, at));
                 let w = f64::from(weight);
                 (a * (1.0 - weight) + b * weight, pdf_a * (1.0 - w) + pdf_b * w)
             }
             Self::Mask { opacity, of } => {
-                let opacity = opacity.luminance_at(uv).clamp(0.0, 1.0);
-                let (value, pdf) = of.eval(wi, wo, uv);
+                let opacity = opacity.luminance_at(&at.texture).clamp(0.0, 1.0);
+                let (value, pdf) = of.eval(wi, wo, at);
                 (value * opacity, pdf * f64::from(opacity))
             }
+            Self::Perturbed(p) => p.eval(wi, wo, at),
+            Self::Principled(p) => principled::Lobes::new(p, at).eval(wi, wo),
+            Self::PrincipledThin(p) => principled_thin::Sheet::new(p, at).eval(wi, wo),
             Self::Conductor { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Null => BLACK,
         }
     }
 
     /// A direction to go on in, from a uniform number that chooses a lobe and two that choose in it. `None` if the path ends.
-    pub(crate) fn sample(&self, wi: DVec3, uv: Vec2, choice: f64, u: [f64; 2]) -> Option<MaterialSample> {
+    pub(crate) fn sample(&self, wi: DVec3, at: &MaterialPoint, choice: f64, u: [f64; 2]) -> Option<MaterialSample> {
         match self {
             Self::Diffuse { .. } => {
                 let (wo, _) = sample_cosine_hemisphere(DVec3::Z, u);
-                self.smooth(wi, if wi.z > 0.0 { wo } else { -wo }, uv, 1.0)
+                self.smooth(wi, if wi.z > 0.0 { wo } else { -wo }, at, 1.0)
             }
             Self::Conductor { eta, k, specular, roughness } => {
                 if wi.z <= 0.0 {
@@ -207,39 +250,39 @@ impl Material {
                 }
                 match roughness {
                     None => {
-                        let weight = specular.at(uv) * fresnel::conductor(wi.z, *eta, *k);
+                        let weight = specular.at(&at.texture) * fresnel::conductor(wi.z, *eta, *k);
                         Some(delta(fresnel::mirrored(wi), weight, 1.0))
                     }
                     Some(roughness) => {
-                        let m = facets(roughness, uv).sample(wi, u);
-                        self.smooth(wi, fresnel::reflected(wi, m), uv, 1.0)
+                        let m = facets(roughness, at).sample(wi, u);
+                        self.smooth(wi, fresnel::reflected(wi, m), at, 1.0)
                     }
                 }
             }
             Self::Dielectric { eta, reflectance, transmittance, roughness: None } => {
                 let f = fresnel::dielectric(wi.z, *eta);
                 if choice < f.reflected {
-                    return Some(delta(fresnel::mirrored(wi), reflectance.at(uv), 1.0));
+                    return Some(delta(fresnel::mirrored(wi), reflectance.at(&at.texture), 1.0));
                 }
                 let wo = dvec3(-wi.x / f.eta, -wi.y / f.eta, f.cos_t);
-                Some(delta(wo, transmittance.at(uv) / (f.eta * f.eta) as f32, f.eta))
+                Some(delta(wo, transmittance.at(&at.texture) / (f.eta * f.eta) as f32, f.eta))
             }
             Self::Dielectric { eta, roughness: Some(roughness), .. } => {
                 let above = if wi.z < 0.0 { -wi } else { wi };
                 // The facet is seen from the side that the light comes to.
-                let m = facets(roughness, uv).sample(above, u);
+                let m = facets(roughness, at).sample(above, u);
                 let f = fresnel::dielectric(wi.dot(m), *eta);
                 if choice < f.reflected {
-                    self.smooth(wi, fresnel::reflected(wi, m), uv, 1.0).filter(|s| s.wo.z * wi.z > 0.0)
+                    self.smooth(wi, fresnel::reflected(wi, m), at, 1.0).filter(|s| s.wo.z * wi.z > 0.0)
                 } else {
-                    self.smooth(wi, fresnel::refracted(wi, m, &f), uv, f.eta).filter(|s| s.wo.z * wi.z < 0.0)
+                    self.smooth(wi, fresnel::refracted(wi, m, &f), at, f.eta).filter(|s| s.wo.z * wi.z < 0.0)
                 }
             }
             Self::ThinDielectric { eta, reflectance, transmittance } => {
                 if choice < thin_reflectance(wi.z, *eta) {
-                    Some(delta(fresnel::mirrored(wi), reflectance.at(uv), 1.0))
+                    Some(delta(fresnel::mirrored(wi), reflectance.at(&at.texture), 1.0))
                 } else {
-                    Some(straight_on(wi, transmittance.at(uv)))
+                    Some(straight_on(wi, transmittance.at(&at.texture)))
                 }
             }
             Self::Plastic { coat, specular, roughness, .. } => {
@@ -248,48 +291,56 @@ impl Material {
                 }
                 let of_coat = coat.choice(wi.z);
                 if choice >= of_coat {
-                    return self.smooth(wi, sample_cosine_hemisphere(DVec3::Z, u).0, uv, 1.0);
+                    return self.smooth(wi, sample_cosine_hemisphere(DVec3::Z, u).0, at, 1.0);
                 }
                 match roughness {
                     None => {
                         let reflected = fresnel::dielectric(wi.z, coat.eta).reflected / of_coat;
-                        Some(delta(fresnel::mirrored(wi), specular.at(uv) * reflected as f32, 1.0))
+                        Some(delta(fresnel::mirrored(wi), specular.at(&at.texture) * reflected as f32, 1.0))
                     }
                     Some(roughness) => {
-                        let m = facets(roughness, uv).sample(wi, u);
-                        self.smooth(wi, fresnel::reflected(wi, m), uv, 1.0)
+                        let m = facets(roughness, at).sample(wi, u);
+                        self.smooth(wi, fresnel::reflected(wi, m), at, 1.0)
                     }
                 }
             }
             Self::TwoSided(of) => {
                 if wi.z > 0.0 {
-                    return of[0].sample(wi, uv, choice, u);
+                    return of[0].sample(wi, at, choice, u);
                 }
-                let sample = of[1].sample(upside_down(wi), uv, choice, u)?;
+                let sample = of[1].sample(upside_down(wi), at, choice, u)?;
                 Some(MaterialSample { wo: upside_down(sample.wo), ..sample })
             }
             Self::Blend { weight, of } => {
-                let weight = f64::from(weight.luminance_at(uv).clamp(0.0, 1.0));
+                let weight = f64::from(weight.luminance_at(&at.texture).clamp(0.0, 1.0));
                 let second = choice < weight;
                 let rest = if second { choice / weight } else { (choice - weight) / (1.0 - weight) };
-                let sample = of[usize::from(second)].sample(wi, uv, rest, u)?;
-                self.among_lobes(wi, sample, uv)
+                let sample = of[usize::from(second)].sample(wi, at, rest, u)?;
+                self.among_lobes(wi, sample, at)
             }
             Self::Mask { opacity, of } => {
-                let opacity = f64::from(opacity.luminance_at(uv).clamp(0.0, 1.0));
+                let opacity = f64::from(opacity.luminance_at(&at.texture).clamp(0.0, 1.0));
                 if choice >= opacity {
                     return Some(straight_on(wi, Rgb::ONE));
                 }
-                let sample = of.sample(wi, uv, choice / opacity, u)?;
-                self.among_lobes(wi, sample, uv)
+                let sample = of.sample(wi, at, choice / opacity, u)?;
+                self.among_lobes(wi, sample, at)
+            }
+            Self::Perturbed(p) => p.sample(wi, at, choice, u),
+            Self::Principled(p) => {
+                let (wo, eta) = principled::Lobes::new(p, at).sample(wi, choice, u)?;
+                self.smooth(wi, wo, at, eta)
+            }
+            Self::PrincipledThin(p) => {
+                self.smooth(wi, principled_thin::Sheet::new(p, at).sample(wi, choice, u)?, at, 1.0)
             }
             Self::Null => Some(straight_on(wi, Rgb::ONE)),
         }
     }
 
     /// A direction of a lobe with a density.
-    fn smooth(&self, wi: DVec3, wo: DVec3, uv: Vec2, eta: f64) -> Option<MaterialSample> {
-        let (value, pdf) = self.eval(wi, wo, uv);
+    fn smooth(&self, wi: DVec3, wo: DVec3, at: &MaterialPoint, eta: f64) -> Option<MaterialSample> {
+        let (value, pdf) = self.eval(wi, wo, at);
         (pdf > 0.0 && pdf.is_finite()).then(|| MaterialSample {
             wo,
             weight: value / pdf as f32,
@@ -301,8 +352,8 @@ impl Material {
 
     /// A sample of one part of a mixture as one of the mixture: what has a density is weighed with that of all parts. The probability of the part
     /// cancels for the others.
-    fn among_lobes(&self, wi: DVec3, sample: MaterialSample, uv: Vec2) -> Option<MaterialSample> {
-        if sample.lobe == Lobe::Smooth { self.smooth(wi, sample.wo, uv, sample.eta) } else { Some(sample) }
+    fn among_lobes(&self, wi: DVec3, sample: MaterialSample, at: &MaterialPoint) -> Option<MaterialSample> {
+        if sample.lobe == Lobe::Smooth { self.smooth(wi, sample.wo, at, sample.eta) } else { Some(sample) }
     }
 }
 
@@ -340,7 +391,7 @@ fn rough_dielectric(
     facets: &Facets,
     wi: DVec3,
     wo: DVec3,
-    uv: Vec2,
+    at: &MaterialPoint,
 ) -> (Rgb, f64) {
     if wi.z == 0.0 || wo.z == 0.0 {
         return BLACK;
@@ -359,11 +410,11 @@ fn rough_dielectric(
     let (d, pdf) = (facets.density(m), facets.pdf(above, m));
     if reflects {
         let value = f * d * seen / (4.0 * wi.z.abs());
-        return (reflectance.at(uv) * value as f32, pdf * f / (4.0 * cos_o.abs()));
+        return (reflectance.at(&at.texture) * value as f32, pdf * f / (4.0 * cos_o.abs()));
     }
     let sum = cos_i + relative * cos_o;
     // The square of the index in eq. 21 is undone by the compression of radiance.
     let value = (1.0 - f) * d * seen * (cos_i * cos_o / (wi.z * sum * sum)).abs();
     let jacobian = (relative * relative * cos_o / (sum * sum)).abs();
-    (transmittance.at(uv) * value as f32, pdf * (1.0 - f) * jacobian)
+    (transmittance.at(&at.texture) * value as f32, pdf * (1.0 - f) * jacobian)
 }

@@ -11,11 +11,14 @@ mod diffuse;
 mod fresnel;
 mod material;
 mod microfacet;
+mod perturbed;
 mod plastic;
+mod principled;
+mod principled_thin;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use self::{
     diffuse::{eval_diffuse, sample_diffuse},
-    material::{Lobe, Material},
+    material::{Lobe, Material, MaterialPoint},
 };

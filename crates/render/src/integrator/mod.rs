@@ -15,7 +15,8 @@ use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
 pub use self::kind::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 use crate::{
-    Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler, TransmittanceEstimator,
+    CameraRay, Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler,
+    TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
     world::{ShadingPoint, SurfacePoint, World},
 };
@@ -130,15 +131,15 @@ impl<R: Recorder> Tracer<'_, R> {
         }
     }
 
-    /// The ray of a camera at `centre` from a point of its lens along `segment`, which begins on the near plane. A far plane ends it only in the medium in which it
-    /// starts: as in Mitsuba 3, a ray that has passed a medium boundary goes on to infinity.
+    /// The ray of a camera at `centre`. A far plane ends it only in the medium in which it starts: as in Mitsuba 3, a ray that has passed a medium boundary goes
+    /// on to infinity.
     #[inline]
-    pub(crate) fn camera_ray(&self, centre: DVec3, position: DVec3, segment: Segment, direction: DVec3) -> PathRay {
+    pub(crate) fn camera_ray(&self, centre: DVec3, &CameraRay { origin, segment, direction }: &CameraRay) -> PathRay {
         let media = &self.world.media;
-        let mut regions = media.at_end(&Segment::new(position, segment.p), media.at_camera());
-        if position != centre {
-            let on_lens = media.at_end(&Segment::new(centre, position), media.at_camera());
-            regions = media.at_end(&Segment::new(position, segment.p), &on_lens);
+        let mut regions = media.at_end(&Segment::new(origin, segment.p), media.at_camera());
+        if origin != centre {
+            let at_origin = media.at_end(&Segment::new(centre, origin), media.at_camera());
+            regions = media.at_end(&Segment::new(origin, segment.p), &at_origin);
         }
         let segment = if self.world.far_plane_clips && !media.crosses_nothing(&segment) {
             Segment::new(segment.p, segment.p + direction * self.world.lights.reach())

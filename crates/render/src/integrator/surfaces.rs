@@ -71,7 +71,7 @@ impl<R: Recorder> Tracer<'_, R> {
             path.radiance += path.throughput * self.direct_light(surface.point, &vertex, &regions, sampler, counters);
         }
         let (choice, u) = (sampler.next_1d(), sampler.next_2d());
-        let Some(sample) = material.sample(shading.wi, shading.uv, choice, u) else { return false };
+        let Some(sample) = material.sample(shading.wi, &shading.at, choice, u) else { return false };
         let direction = match sample.lobe {
             Lobe::Null => path.ray.direction,
             Lobe::Smooth | Lobe::Delta => shading.world(sample.wo),
@@ -107,5 +107,5 @@ impl<R: Recorder> Tracer<'_, R> {
 #[inline(never)]
 pub(super) fn eval(world: &World, shading: &ShadingPoint, to: DVec3) -> (Rgb, f64) {
     let material = &world.materials[shading.material as usize].material;
-    material.eval(shading.wi, shading.local(to), shading.uv)
+    material.eval(shading.wi, shading.local(to), &shading.at)
 }

@@ -5,6 +5,7 @@ mod constant;
 mod directional;
 mod envmap;
 mod point;
+mod projector;
 mod spot;
 
 use glam::DVec3;
@@ -13,6 +14,7 @@ use vdf_scene::{Emitter, Rgb, Scene};
 use self::{
     area::{AreaLight, AreaPoint},
     envmap::EnvmapLight,
+    projector::ProjectorLight,
     spot::SpotLight,
 };
 
@@ -36,7 +38,8 @@ pub struct Lights {
 #[derive(Debug)]
 enum Light {
     Point { position: DVec3, intensity: Rgb },
-    Spot(SpotLight),
+    Spot(Box<SpotLight>),
+    Projector(Box<ProjectorLight>),
     Area(AreaLight),
     Directional { direction: DVec3, irradiance: Rgb },
     Constant { radiance: Rgb },
@@ -93,8 +96,18 @@ impl Lights {
             .iter()
             .map(|e| match *e {
                 Emitter::Point { position, intensity } => Light::Point { position, intensity },
-                Emitter::Spot { position, direction, intensity, beam, cutoff } => {
-                    Light::Spot(SpotLight { position, direction, intensity, beam, cutoff })
+                Emitter::Spot { position, direction, intensity, beam, cutoff, ref slide } => {
+                    Light::Spot(Box::new(SpotLight {
+                        position,
+                        direction,
+                        intensity,
+                        beam,
+                        cutoff,
+                        slide: slide.clone(),
+                    }))
+                }
+                Emitter::Projector { position, direction, ref slide } => {
+                    Light::Projector(Box::new(ProjectorLight { position, direction, slide: (**slide).clone() }))
                 }
                 Emitter::Directional { direction, irradiance } => Light::Directional { direction, irradiance },
                 Emitter::Envmap { ref image, scale, ref world_from_map } => {
@@ -176,7 +189,7 @@ impl Lights {
     #[inline]
     pub(crate) fn sample_point(&self, emitter: usize, u: [f64; 2]) -> Option<EmitterPoint> {
         let place = match &self.lights[emitter] {
-            Light::Point { .. } | Light::Spot(_) => Place::Point,
+            Light::Point { .. } | Light::Spot(_) | Light::Projector(_) => Place::Point,
             Light::Area(light) => Place::Area(light.sample(u)?),
             Light::Directional { .. } | Light::Constant { .. } | Light::Envmap(_) => Place::Infinite(u),
         };
@@ -194,6 +207,7 @@ impl Lights {
                 Some(constant::sample(emitter, from, *u, *radiance, self.pdf_constant(), self.reach))
             }
             (Light::Spot(light), _) => light.sample(emitter, from, choices),
+            (Light::Projector(light), _) => light.sample(emitter, from, choices),
             (Light::Directional { direction, irradiance }, _) => {
                 Some(directional::sample(emitter, from, *direction, *irradiance, choices, self.reach))
             }
@@ -205,18 +219,20 @@ impl Lights {
     /// Where a place is and, if it shines to one side only, the unit normal of that side; `None` if it is infinitely far away.
     #[inline]
     pub(crate) fn position(&self, point: &EmitterPoint) -> Option<(DVec3, Option<DVec3>)> {
-        match (&self.lights[point.emitter], &point.place) {
-            (Light::Point { position, .. } | Light::Spot(SpotLight { position, .. }), _) => Some((*position, None)),
-            (_, Place::Area(place)) => Some((place.point, Some(place.normal))),
-            _ => None,
+        match &point.place {
+            Place::Point => self.point_position(point.emitter).map(|position| (position, None)),
+            Place::Area(place) => Some((place.point, Some(place.normal))),
+            Place::Infinite(_) => None,
         }
     }
 
     /// Where an emitter is, if it is a point.
     #[inline]
     pub(crate) fn point_position(&self, emitter: usize) -> Option<DVec3> {
-        match self.lights[emitter] {
-            Light::Point { position, .. } | Light::Spot(SpotLight { position, .. }) => Some(position),
+        match &self.lights[emitter] {
+            Light::Point { position, .. } => Some(*position),
+            Light::Spot(light) => Some(light.position),
+            Light::Projector(light) => Some(light.position),
             _ => None,
         }
     }

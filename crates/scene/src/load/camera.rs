@@ -1,12 +1,12 @@
 //! The sensor and its sampler.
 
-use glam::{DMat3, DMat4};
+use glam::{DMat3, DMat4, DVec3};
 
 use super::document::Element;
 use super::properties::Object;
 use super::{Loader, features, film, objects};
 use crate::SceneError;
-use crate::{FilmSettings, Lens, PerspectiveSensor};
+use crate::{FilmSettings, Lens, Projection, Sensor};
 
 /// A matrix written with three digits is this far from a rotation in the products of its columns; a scale of 0.1 % is farther.
 const MOST_SCALE: f64 = 2e-3;
@@ -16,7 +16,7 @@ const LEAST_TO_WARN: f64 = 1e-6;
 /// The sensor with what is nested in it: film, samples per pixel, seed.
 #[derive(Debug)]
 pub(super) struct Camera {
-    pub(super) sensor: PerspectiveSensor,
+    pub(super) sensor: Sensor,
     pub(super) film: FilmSettings,
     pub(super) sample_count: u32,
     pub(super) seed: u64,
@@ -26,6 +26,13 @@ pub(super) struct Camera {
 pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<Camera, SceneError> {
     let mut object = Object::new(loader, element, features::kinds("sensor"))?;
     let world_from_camera = object.world_transform(loader)?;
+    let is_orthographic = object.kind() == "orthographic";
+    let (scale, world_from_camera) = if is_orthographic {
+        let scale = scale(world_from_camera);
+        (scale, world_from_camera * DMat4::from_scale(scale.recip()))
+    } else {
+        (DVec3::ONE, world_from_camera)
+    };
     let world_from_camera = rigid(loader, &object, world_from_camera)?;
     object.without_effect(loader, &["shutter_open", "shutter_close", "sample_border", "use_radiance"])?;
     for name in ["principal_point_offset_x", "principal_point_offset_y"] {
@@ -33,6 +40,8 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     }
     let near_clip = object.float_where("near_clip", 0.01, |v| v > 0.0, "positive")?;
     let far_clip = object.float_where("far_clip", 1e4, |v| v > near_clip, "more than near_clip")?;
+    // As in Mitsuba, the camera's scale moves the near plane, and the far one stays as far behind it.
+    let (near_clip, far_clip) = (near_clip * scale.z, far_clip + near_clip * (scale.z - 1.0));
     let lens = lens(loader, &mut object, far_clip)?;
     let Some(film) = object.at_most_one("film")? else {
         return Err(object.error("no film", "add <film type=\"hdrfilm\"> to the sensor"));
@@ -46,25 +55,41 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
         Some(nested) => Some(objects::medium(loader, nested.object)?),
         None => None,
     };
-    let tan_half_fov_x = field_of_view(&mut object, f64::from(film.width) / f64::from(film.height))?;
+    let aspect = f64::from(film.width) / f64::from(film.height);
+    let projection = if is_orthographic {
+        Projection::Orthographic { half_width: scale.x, half_height: scale.y / aspect }
+    } else {
+        Projection::Perspective { tan_half_fov_x: field_of_view(&mut object, aspect)?, lens }
+    };
     object.finish()?;
-    let sensor = PerspectiveSensor { world_from_camera, tan_half_fov_x, near_clip, far_clip, lens, medium };
+    let sensor = Sensor { world_from_camera, projection, near_clip, far_clip, medium };
     Ok(Camera { sensor, film, sample_count, seed })
+}
+
+/// How much a transform stretches each axis; of an orthographic camera that is what it sees.
+fn scale(m: DMat4) -> DVec3 {
+    DVec3::from_array([m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.length()))
 }
 
 /// The transform without what its digits lost: its axes become unit vectors at right angles. Mitsuba takes such a matrix as it is; a
 /// camera that scales is refused by both.
-fn rigid(loader: &Loader<'_>, object: &Object<'_>, m: DMat4) -> Result<DMat4, SceneError> {
+pub(super) fn rigid(loader: &Loader<'_>, object: &Object<'_>, m: DMat4) -> Result<DMat4, SceneError> {
     let linear = DMat3::from_mat4(m);
     let product = linear.transpose() * linear - DMat3::IDENTITY;
     let error = product.to_cols_array().into_iter().fold(0.0, |most: f64, v| most.max(v.abs()));
     if error.is_nan() || error > MOST_SCALE {
-        let help = "only rotate and translate it; an axis of <rotate> must have length 1";
-        return Err(object.place_of("to_world").error("to_world of the sensor scales", help));
+        let (what, help) = if object.kind() == "orthographic" {
+            ("shears", "only rotate, translate and scale it, the scaling first")
+        } else {
+            ("scales", "only rotate and translate it; an axis of <rotate> must have length 1")
+        };
+        return Err(object.place_of("to_world").error(format!("to_world of the {} {what}", object.element.tag), help));
     }
     if error > LEAST_TO_WARN {
-        let message =
-            format!("to_world of the sensor is a rotation only up to {error:.0e}: its axes were made orthonormal");
+        let message = format!(
+            "to_world of the {} is a rotation only up to {error:.0e}: its axes were made orthonormal",
+            object.element.tag
+        );
         loader.warn(object.place_of("to_world"), &message);
     } else if error < 1e-12 {
         return Ok(m);
@@ -90,7 +115,7 @@ fn lens(loader: &Loader<'_>, object: &mut Object<'_>, far_clip: f64) -> Result<O
 }
 
 /// tan(X/2), X the horizontal field of view.
-fn field_of_view(object: &mut Object<'_>, aspect: f64) -> Result<f64, SceneError> {
+pub(super) fn field_of_view(object: &mut Object<'_>, aspect: f64) -> Result<f64, SceneError> {
     let from_diagonal = |tan: f64| tan / (1.0 + 1.0 / (aspect * aspect)).sqrt();
     let axis = object.choice("fov_axis", "x", &["x", "y", "diagonal", "smaller", "larger"])?;
     let focal_length = object.string("focal_length")?;

@@ -28,9 +28,13 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
             "twosided",
             "mask",
             "blendbsdf",
+            "normalmap",
+            "bumpmap",
+            "principled",
+            "principledthin",
             "null",
         ],
-        "emitter" => &["point", "constant", "area", "envmap", "spot", "directional"],
+        "emitter" => &["point", "constant", "area", "envmap", "spot", "projector", "directional"],
         "film" => &["hdrfilm"],
         "integrator" => {
             &["volpath", "volpathmis", "path", "direct", "prb", "prbvolpath", "prb_basic", "moment", "aov", "stokes"]
@@ -39,11 +43,11 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
         "phase" => &["isotropic", "hg"],
         "rfilter" => &["box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"],
         "sampler" => &["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
-        "sensor" => &["perspective", "thinlens"],
+        "sensor" => &["perspective", "thinlens", "orthographic"],
         "shape" => {
             &["obj", "ply", "serialized", "cube", "rectangle", "sphere", "disk", "cylinder", "shapegroup", "instance"]
         }
-        "texture" => &["bitmap", "checkerboard"],
+        "texture" => &["bitmap", "checkerboard", "mesh_attribute", "rawconstant"],
         _ => &[],
     }
 }

@@ -3,8 +3,8 @@
 use super::document::Element;
 use super::metals::METALS;
 use super::properties::Object;
-use super::{Loader, features, names};
-use crate::{Bsdf, Microfacets, Rgb, Roughness, SceneError, Texture};
+use super::{Loader, features, names, textures};
+use crate::{Bsdf, Microfacets, Perturbation, Principled, PrincipledThin, Rgb, Roughness, SceneError, Texture};
 
 /// BSDFs nest at most this deep.
 const MAX_DEPTH: usize = 8;
@@ -95,10 +95,123 @@ fn read<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> Result<B
             let of = [read(loader, first.object, depth + 1)?, read(loader, second.object, depth + 1)?];
             Bsdf::Blend { weight, of: Box::new(of) }
         }
+        "normalmap" | "bumpmap" => perturbed(loader, o, depth)?,
+        "principled" => principled(loader, o)?,
+        "principledthin" => principled_thin(loader, o)?,
         _ => Bsdf::Null,
     };
     object.finish()?;
     Ok(bsdf)
+}
+
+fn perturbed<'a>(loader: &Loader<'a>, object: &mut Object<'a>, depth: usize) -> Result<Bsdf, SceneError> {
+    let flip_invalid_normals = object.boolean("flip_invalid_normals", true)?;
+    let shadowing = object.boolean("use_shadowing_function", true)?;
+    let by = if object.kind() == "normalmap" {
+        if !object.has_any("normalmap") {
+            return Err(object.error("no texture \"normalmap\"", "add <texture name=\"normalmap\" …>"));
+        }
+        Perturbation::Normals(object.texture(loader, "normalmap", 0.5)?)
+    } else {
+        let scale = object.float("scale")?.unwrap_or(1.0);
+        let [texture] = object.other_textures()[..] else {
+            return Err(object.error("it must hold one texture", "nest one, of any name"));
+        };
+        let heights = textures::read(loader, texture)?;
+        if !matches!(heights, Texture::Constant(_) | Texture::Bitmap { .. }) {
+            return Err(texture.at.error("bumps of something that is no picture", "write <texture type=\"bitmap\" …>"));
+        }
+        Perturbation::Heights { texture: heights, scale }
+    };
+    let [nested] = object.nested("bsdf")[..] else {
+        return Err(object.error("it must hold one BSDF", "nest one"));
+    };
+    let of = Box::new(read(loader, nested.object, depth + 1)?);
+    if of.passes_straight() {
+        let message = "light goes straight through the BSDF inside: Mitsuba blocks shadow rays there, here they pass";
+        loader.warn(nested.at, message);
+    }
+    Ok(Bsdf::Perturbed { by, flip_invalid_normals, shadowing, of })
+}
+
+/// How often a lobe is drawn.
+fn rate(object: &mut Object<'_>, name: &'static str) -> Result<f64, SceneError> {
+    object.float_where(name, 1.0, |v| (0.0..=1e6).contains(&v), "from 0 to a million")
+}
+
+fn principled<'a>(loader: &Loader<'a>, o: &mut Object<'a>) -> Result<Bsdf, SceneError> {
+    let spec_trans = o.texture(loader, "spec_trans", 0.0)?;
+    let transmits = spec_trans != Texture::grey(0.0);
+    if o.has("eta") && o.has("specular") {
+        return Err(o.place_of("specular").error("\"eta\" together with \"specular\"", "write one or the other"));
+    }
+    // A boundary between equal indices would not refract: as Mitsuba does, it gets a little.
+    let eta = if o.has("eta") {
+        let eta = o.float_where("eta", 1.5, |v| v > 0.0, "positive")?;
+        if transmits && eta == 1.0 { 1.001 } else { eta }
+    } else {
+        let specular = o.float_where("specular", 0.5, |v| (0.0..=1.0).contains(&v), "in [0, 1]")?;
+        let specular = if transmits && specular == 0.0 { 1e-3 } else { specular };
+        2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0
+    };
+    let mut texture = |name, default| o.texture(loader, name, default);
+    let mut principled = Principled {
+        base_color: texture("base_color", 0.5)?,
+        roughness: texture("roughness", 0.5)?,
+        anisotropic: texture("anisotropic", 0.0)?,
+        metallic: texture("metallic", 0.0)?,
+        spec_trans,
+        eta,
+        spec_tint: texture("spec_tint", 0.0)?,
+        sheen: texture("sheen", 0.0)?,
+        sheen_tint: texture("sheen_tint", 0.0)?,
+        flatness: texture("flatness", 0.0)?,
+        clearcoat: texture("clearcoat", 0.0)?,
+        clearcoat_gloss: texture("clearcoat_gloss", 0.0)?,
+        sampling_rates: [1.0; 3],
+    };
+    let names = ["diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate"];
+    for (slot, name) in principled.sampling_rates.iter_mut().zip(names) {
+        *slot = rate(o, name)?;
+    }
+    Ok(Bsdf::Principled(Box::new(principled)))
+}
+
+fn principled_thin<'a>(loader: &Loader<'a>, o: &mut Object<'a>) -> Result<Bsdf, SceneError> {
+    let (eta, diff_trans) = (o.unbounded_texture(loader, "eta", 1.5)?, o.unbounded_texture(loader, "diff_trans", 0.0)?);
+    let outside = |texture: &Texture, legal: fn(f32) -> bool| {
+        texture.constant().is_some_and(|c| !c.to_array().into_iter().all(legal))
+    };
+    if outside(&eta, |v| v > 0.0) {
+        return Err(o.place_of("eta").error("\"eta\" is 0", "it must be positive"));
+    }
+    if outside(&diff_trans, |v| v <= 2.0) {
+        return Err(o.place_of("diff_trans").error("\"diff_trans\" is more than 2", "it must be in [0, 2]"));
+    }
+    let mut texture = |name, default| o.texture(loader, name, default);
+    let mut thin = PrincipledThin {
+        base_color: texture("base_color", 0.5)?,
+        roughness: texture("roughness", 0.5)?,
+        anisotropic: texture("anisotropic", 0.0)?,
+        spec_trans: texture("spec_trans", 0.0)?,
+        eta,
+        spec_tint: texture("spec_tint", 0.0)?,
+        sheen: texture("sheen", 0.0)?,
+        sheen_tint: texture("sheen_tint", 0.0)?,
+        flatness: texture("flatness", 0.0)?,
+        diff_trans,
+        sampling_rates: [1.0; 4],
+    };
+    let names = [
+        "diffuse_reflectance_sampling_rate",
+        "specular_reflectance_sampling_rate",
+        "diffuse_transmittance_sampling_rate",
+        "specular_transmittance_sampling_rate",
+    ];
+    for (slot, name) in thin.sampling_rates.iter_mut().zip(names) {
+        *slot = rate(o, name)?;
+    }
+    Ok(Bsdf::PrincipledThin(Box::new(thin)))
 }
 
 fn two_sided<'a>(loader: &Loader<'a>, object: &mut Object<'a>, depth: usize) -> Result<Bsdf, SceneError> {

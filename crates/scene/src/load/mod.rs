@@ -23,6 +23,8 @@ mod tests;
 mod tests_hostile;
 #[cfg(test)]
 mod tests_mitsuba;
+#[cfg(test)]
+mod tests_surfaces;
 mod textures;
 mod transform;
 mod xml;
@@ -36,6 +38,7 @@ use document::{Element, Ids, OBJECT_TAGS, Place};
 use parameters::Parameters;
 use search::Search;
 
+use crate::mesh::Attributes;
 use crate::text::shown;
 use crate::{Boundary, Emitter, Medium, MediumId, Scene, SceneError, SceneSource, Surface};
 
@@ -85,6 +88,7 @@ impl Scene {
             mesh_bytes: 0,
             triangles: 0,
             copies: 0,
+            attributes: None,
             media: Vec::new(),
             medium_of_element: HashMap::new(),
             surfaces: Vec::new(),
@@ -111,6 +115,8 @@ struct Loader<'a> {
     triangles: usize,
     /// Shapes that instances have made so far.
     copies: usize,
+    /// What the mesh carries whose BSDF is being read; `None` where a BSDF stands by itself.
+    attributes: Option<Attributes>,
     media: Vec<Medium>,
     medium_of_element: HashMap<usize, MediumId>,
     surfaces: Vec<Surface>,

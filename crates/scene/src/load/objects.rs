@@ -1,12 +1,12 @@
 //! Media and emitters.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use super::document::Element;
 use super::properties::Object;
-use super::{Loader, features, textures};
+use super::{Loader, camera, features, textures};
 use crate::{Emitter, Medium, MediumId, Phase};
-use crate::{Rgb, SceneError};
+use crate::{Rgb, SceneError, Slide, Texture};
 
 /// The medium's index; each is read once, however often it is referred to.
 pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<MediumId, SceneError> {
@@ -68,6 +68,7 @@ pub(super) fn emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<O
             Emitter::Point { position, intensity: object.emission(loader, "intensity")? }
         }
         "spot" => spot(loader, &mut object)?,
+        "projector" => projector(loader, &mut object)?,
         "directional" => directional(loader, &mut object)?,
         "envmap" => envmap(loader, &mut object)?,
         _ => Emitter::Constant { radiance: object.emission(loader, "radiance")? },
@@ -84,16 +85,37 @@ fn spot<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, Sce
     let cutoff = object.float_where("cutoff_angle", 20.0, in_range, "more than 0 and at most 180 degrees")?;
     let beam =
         object.float_where("beam_width", cutoff * 0.75, |b| b >= 0.0 && b <= cutoff, "from 0 to cutoff_angle")?;
-    if object.texture_element("texture")?.is_some() {
-        return Err(object.error("a spot with a texture is not supported", "remove the texture"));
-    }
-    Ok(Emitter::Spot {
-        position: to_world.w_axis.truncate(),
-        direction: to_world.z_axis.truncate().normalize(),
-        intensity,
-        beam: beam.to_radians(),
-        cutoff: cutoff.to_radians(),
-    })
+    let (position, direction) = (to_world.w_axis.truncate(), to_world.z_axis.truncate().normalize());
+    let (beam, cutoff) = (beam.to_radians(), cutoff.to_radians());
+    let slide = match object.texture_element("texture")? {
+        None => None,
+        Some(nested) => {
+            let local = DMat3::from_mat4(to_world).inverse();
+            // The rows of the map to the light's space, where its own axis has unit length.
+            let row = |i| local.row(i) / (local.row(2).length() * cutoff.tan());
+            Some(Box::new(Slide { texture: textures::read(loader, nested)?, scale: 1.0, axes: [row(0), row(1)] }))
+        }
+    };
+    Ok(Emitter::Spot { position, direction, intensity, beam, cutoff, slide })
+}
+
+fn projector<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, SceneError> {
+    let to_world = object.world_transform(loader)?;
+    let to_world = camera::rigid(loader, object, to_world)?;
+    let texture = match object.texture_element("irradiance")? {
+        Some(nested) => textures::read(loader, nested)?,
+        None => Texture::Constant(object.emission(loader, "irradiance")?),
+    };
+    let scale = object.float_where("scale", 1.0, |v| v >= 0.0 && v <= f64::from(f32::MAX), "at least 0")? as f32;
+    let aspect = match &texture {
+        Texture::Bitmap { image, .. } => f64::from(image.width) / f64::from(image.height),
+        _ => 1.0,
+    };
+    let tan = camera::field_of_view(object, aspect)?;
+    let [left, up, forward] = [to_world.x_axis, to_world.y_axis, to_world.z_axis].map(DVec4::truncate);
+    // The picture begins at its upper left.
+    let slide = Box::new(Slide { texture, scale, axes: [-left / tan, -up * aspect / tan] });
+    Ok(Emitter::Projector { position: to_world.w_axis.truncate(), direction: forward, slide })
 }
 
 fn directional<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, SceneError> {

@@ -252,6 +252,19 @@ impl<'a> Object<'a> {
         }
     }
 
+    /// As [`Object::texture`], for what may exceed 1.
+    pub(super) fn unbounded_texture(
+        &mut self,
+        loader: &Loader<'a>,
+        name: &'static str,
+        default: f32,
+    ) -> Result<Texture, SceneError> {
+        match self.texture_element(name)? {
+            Some(nested) => textures::read(loader, nested),
+            None => self.colour(loader, name, default, None, Weighed::ByDaylight).map(Texture::Constant),
+        }
+    }
+
     /// As [`Object::texture`], but positive: a `<float>` of 0 is an error.
     pub(super) fn positive_texture(
         &mut self,
@@ -282,6 +295,32 @@ impl<'a> Object<'a> {
         Ok(found)
     }
 
+    /// The textures that nobody asked for by their name.
+    pub(super) fn other_textures(&mut self) -> Vec<&'a Element> {
+        let mut found = Vec::new();
+        for (_, target, used) in &mut self.children {
+            let Some(object) = target.filter(|t| t.tag == "texture" && !*used) else { continue };
+            *used = true;
+            found.push(object);
+        }
+        found
+    }
+
+    /// Three numbers that are no colour, each at least 0; a `<float>` is all three.
+    pub(super) fn raw(&mut self, name: &'static str) -> Result<Option<Rgb>, SceneError> {
+        let Some(element) = self.property(name, &["float", "integer", "vector", "rgb"])? else { return Ok(None) };
+        let value = match element.tag.as_str() {
+            "float" | "integer" => DVec3::splat(number(element)?),
+            "rgb" => rgb(element)?,
+            _ => self.three(name, &["vector"])?.unwrap_or_default(),
+        };
+        if value.min_element() >= 0.0 && value.as_vec3().is_finite() {
+            return Ok(Some(value.as_vec3()));
+        }
+        let message = format!("\"{name}\" is {}, {}, {}", value.x, value.y, value.z);
+        Err(element.at.error(message, "each must be at least 0 and fit into single precision"))
+    }
+
     /// True if there is a property, or a texture, of that name.
     pub(super) fn has_any(&self, name: &str) -> bool {
         self.children.iter().any(|(c, ..)| c.attribute("name").is_some_and(|a| a.value == name))
@@ -289,7 +328,16 @@ impl<'a> Object<'a> {
 
     /// True if the property is there as a string.
     pub(super) fn is_string(&self, name: &str) -> bool {
-        self.children.iter().any(|(c, ..)| c.tag == "string" && c.attribute("name").is_some_and(|a| a.value == name))
+        self.is_a(name, "string")
+    }
+
+    /// True if the property is there as a number.
+    pub(super) fn is_number(&self, name: &str) -> bool {
+        self.is_a(name, "float")
+    }
+
+    fn is_a(&self, name: &str, tag: &str) -> bool {
+        self.children.iter().any(|(c, ..)| c.tag == tag && c.attribute("name").is_some_and(|a| a.value == name))
     }
 
     /// A transform that is not read yet.

@@ -9,7 +9,7 @@ use super::document::{Attribute, Element, OBJECT_TAGS, PROPERTY_TAGS, Place};
 use super::features::FOREIGN_TAGS;
 use super::lines::Lines;
 use super::parameters::Parameters;
-use super::search::{Search, sibling};
+use super::search::Search;
 use super::{names, xml};
 use crate::{SceneError, SceneSource};
 
@@ -173,11 +173,12 @@ impl Reader<'_> {
     }
 
     fn search_folder(&mut self, element: &Element, file: &Path) -> Result<(), SceneError> {
-        let folder = sibling(file, element.require("value")?);
+        let folder = self.search.folder(self.source, file, element.require("value")?);
         if !self.source.has_folder(&folder) {
-            return Err(element
-                .at
-                .error(format!("there is no folder \"{}\"", folder.display()), "the path is relative to this file"));
+            return Err(element.at.error(
+                format!("there is no folder \"{}\"", folder.display()),
+                "the path is relative to this file, to the scene file, or to a folder of an earlier <path>",
+            ));
         }
         if self.search.len() >= MAX_SEARCH_FOLDERS {
             return Err(element.at.error(format!("more than {MAX_SEARCH_FOLDERS} of <path>"), ""));

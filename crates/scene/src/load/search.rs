@@ -23,9 +23,25 @@ impl Search {
 
     /// The path of an included file: beside the including file, beside the scene file, or in a folder of a `<path>`.
     pub(super) fn include(&self, source: &SceneSource, includer: &Path, name: &str) -> PathBuf {
-        let beside = sibling(includer, name);
-        let others = std::iter::once(sibling(source.path(), name)).chain(self.folders.iter().map(|f| f.join(name)));
-        existing(source, beside, others)
+        self.first(source, includer, name, SceneSource::has)
+    }
+
+    /// A folder, found as an include is.
+    pub(super) fn folder(&self, source: &SceneSource, includer: &Path, name: &str) -> PathBuf {
+        self.first(source, includer, name, SceneSource::has_folder)
+    }
+
+    /// The first place at which something is, or else beside the including file, so that a message names the most likely place.
+    fn first(
+        &self,
+        source: &SceneSource,
+        includer: &Path,
+        name: &str,
+        is_there: fn(&SceneSource, &Path) -> bool,
+    ) -> PathBuf {
+        let beside = [includer, source.path()].map(|file| sibling(file, name));
+        let mut all = beside.into_iter().chain(self.folders.iter().map(|f| f.join(name)));
+        all.find(|path| is_there(source, path)).unwrap_or_else(|| sibling(includer, name))
     }
 
     /// The path of a mesh: in a folder of a `<path>`, or beside the scene file.
@@ -33,15 +49,6 @@ impl Search {
         let beside = sibling(source.path(), name);
         self.folders.iter().map(|f| f.join(name)).find(|path| source.has(path)).unwrap_or(beside)
     }
-}
-
-/// The first path that is there, or else `first`, so that a message names the most likely place.
-fn existing(source: &SceneSource, first: PathBuf, others: impl Iterator<Item = PathBuf>) -> PathBuf {
-    if source.has(&first) {
-        return first;
-    }
-    let mut others = others;
-    others.find(|path| source.has(path)).unwrap_or(first)
 }
 
 /// `name` relative to the folder of `file`.

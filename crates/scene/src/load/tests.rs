@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::{DVec3, Vec3};
 
 use super::LoadOptions;
-use crate::{Bsdf, EmbeddedFile, Emitter, Phase, Scene, SceneError, SceneSource};
+use crate::{Bsdf, EmbeddedFile, Emitter, Phase, Projection, Scene, SceneError, SceneSource};
 
 pub(super) const HEAD: &str = "<scene version='3.0.0'>\n<integrator type='volpath'/>\n";
 pub(super) const FILM: &str = "<film type='hdrfilm'/>";
@@ -277,9 +277,17 @@ fn emitters_are_read() {
     assert!(dark.warnings[0].contains("no emitter"));
 }
 
+/// The field of view, as the tangent of its half.
+pub(super) fn tan_of(scene: &Scene) -> f64 {
+    match scene.sensor.projection {
+        Projection::Perspective { tan_half_fov_x, .. } => tan_half_fov_x,
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn the_field_of_view_follows_its_axis() {
-    let tan = |inner: &str| load_with(&with_sensor("", inner), &[], &[]).unwrap().sensor.tan_half_fov_x;
+    let tan = |inner: &str| tan_of(&load_with(&with_sensor("", inner), &[], &[]).unwrap());
     let aspect = 768.0 / 576.0;
     let fov = "<float name='fov' value='90'/>";
     for (axis, expected) in [("x", 1.0), ("larger", 1.0), ("y", aspect), ("smaller", aspect), ("diagonal", 0.8)] {

@@ -3,9 +3,10 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::LoadOptions;
-use super::tests::{FILM, FOG, HEAD, LIGHT, file, load, load_with, refused, refused_text, with_sensor};
+use super::tests::{FILM, FOG, HEAD, LIGHT, file, load, load_with, refused, refused_text, tan_of, with_sensor};
 use crate::{
-    Bsdf, ComponentFormat, Emitter, IntegratorSettings, Microfacets, ReconstructionFilter, Scene, SceneSource, Texture,
+    Bsdf, ComponentFormat, Emitter, IntegratorSettings, Microfacets, Projection, ReconstructionFilter, Scene,
+    SceneSource, Texture,
 };
 
 fn warned(scene: &Scene, part: &str) -> bool {
@@ -189,11 +190,40 @@ fn one_of_several_sensors_is_chosen() {
         Scene::from_source(&source, &LoadOptions { sensor, ..LoadOptions::default() })
     };
     let first = chosen(None).unwrap();
-    assert!((first.sensor.tan_half_fov_x - 1.0).abs() < 1e-12 && warned(&first, "the scene has 2 sensors: the first"));
+    assert!((tan_of(&first) - 1.0).abs() < 1e-12 && warned(&first, "the scene has 2 sensors: the first"));
     assert!(chosen(Some(0)).unwrap().warnings.is_empty());
-    assert!((chosen(Some(1)).unwrap().sensor.tan_half_fov_x - 30_f64.to_radians().tan()).abs() < 1e-12);
+    assert!((tan_of(&chosen(Some(1)).unwrap()) - 30_f64.to_radians().tan()).abs() < 1e-12);
     let message = chosen(Some(2)).unwrap_err().to_string();
     assert!(message.contains("no sensor 2") && message.contains("it has 2"), "{message}");
+}
+
+/// What the camera's scale stretches is what it sees; the near plane moves with it, and the far one stays as far behind.
+#[test]
+fn an_orthographic_camera_sees_what_its_scale_says() {
+    let text = |transform: &str, inner: &str| {
+        format!(
+            "{HEAD}<shape type='cube'/>\n<sensor type='orthographic'><transform name='to_world'>{transform}</transform>\
+             <float name='near_clip' value='2'/><float name='far_clip' value='7'/>{FILM}{inner}</sensor>{LIGHT}</scene>"
+        )
+    };
+    let moved = "<scale x='8' y='6' z='3'/><lookat origin='-9, 0, 0' target='0, 0, 0' up='0, 0, 1'/>";
+    let scene = load_with(&text(moved, ""), &[], &[]).unwrap();
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    let sensor = scene.sensor;
+    assert_eq!(sensor.projection, Projection::Orthographic { half_width: 8.0, half_height: 4.5 });
+    assert_eq!((sensor.near_clip, sensor.far_clip), (6.0, 11.0));
+    assert!((sensor.world_from_camera.z_axis.truncate() - DVec3::X).length() < 1e-12);
+    let far = load_with(&text(&moved.replace("-9", "-90"), ""), &[], &[]).unwrap();
+    assert!(warned(&far, "nothing of the scene lies between near_clip (6) and far_clip (11)"), "{:?}", far.warnings);
+    let sheared = "<matrix value='1 0.5 0 0  0 1 0 0  0 0 1 0  0 0 0 1'/>";
+    refused_text(&text(sheared, ""), &[], "s.xml:4:29", "shears");
+    refused_text(&text(moved, "<float name='fov' value='30'/>"), &[], "s.xml:4:242", "no property \"fov\"");
+    // Fog that begins before the near plane, above the camera, where only rays of the film's border pass.
+    let fog = "<medium type='homogeneous' id='fog'/><shape type='cube'><transform name='to_world'><scale value='0.5'/>\
+        <translate x='-7' z='4'/></transform><bsdf type='null'/><ref id='fog' name='interior'/></shape>";
+    let jumped =
+        load_with(&text(moved, "").replace("<shape type='cube'/>", &format!("<shape type='cube'/>{fog}")), &[], &[]);
+    assert!(warned(&jumped.unwrap(), "jumps over the medium boundary"));
 }
 
 #[test]
@@ -235,20 +265,20 @@ fn an_area_light_with_a_null_bsdf_is_a_black_one() {
 
 #[test]
 fn all_features_that_a_scene_lacks_are_named_at_once() {
-    let body = "<emitter type='projector'><string name='filename' value='a.exr'/></emitter>\n\
-         <shape type='hair'><string name='filename' value='none.hair'/><bsdf type='twosided'><bsdf type='principled'>\
+    let body = "<emitter type='sunsky'><string name='filename' value='a.exr'/></emitter>\n\
+         <shape type='hair'><string name='filename' value='none.hair'/><bsdf type='twosided'><bsdf type='measured'>\
          <texture type='wood' name='diffuse_reflectance'/></bsdf></bsdf></shape>\n\
          <shape type='hair'><string name='filename' value='none.hair'/></shape>\n\
          <bsdf type='diffuse' id='b'><spectrum name='reflectance' type='d65'><float name='scale' value='1'/></spectrum></bsdf>\n\
          <medium type='homogeneous'><rgb name='sigma_t' value='1 2 3'/></medium>";
-    let list = "6 features of this scene are not supported: emitter \"projector\" (s.xml:3), shape \"hair\" (s.xml:4 and 1 more), \
-                bsdf \"principled\" (s.xml:4), texture \"wood\" (s.xml:4), \
+    let list = "6 features of this scene are not supported: emitter \"sunsky\" (s.xml:3), shape \"hair\" (s.xml:4 and 1 more), \
+                bsdf \"measured\" (s.xml:4), texture \"wood\" (s.xml:4), \
                 spectrum \"d65\" (s.xml:6), chromatic sigma_t (s.xml:7)\n";
     refused(body, "3:1", list);
     refused(
         body,
         "3:1",
-        "twosided, mask, blendbsdf, null; emitter point, constant, area, envmap, spot, directional; shape obj",
+        "principled, principledthin, null; emitter point, constant, area, envmap, spot, projector, directional; shape obj",
     );
     // One alone has its own message, before any file is looked for.
     let hair = "<shape type='obj'><string name='filename' value='none.obj'/></shape><shape type='hair'/>";

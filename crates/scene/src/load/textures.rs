@@ -30,16 +30,28 @@ fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> R
     if depth == MAX_DEPTH {
         return Err(object.error("textures nest too deep", ""));
     }
-    let to_uv = uv_transform(loader, &mut object)?;
-    let texture = if object.kind() == "checkerboard" {
-        let mut colour = |name, default| match object.texture_element(name)? {
-            Some(nested) => read_within(loader, nested, depth + 1),
-            None => object.reflectance(loader, name, default).map(Texture::Constant),
-        };
-        let (first, second) = (colour("color0", 0.4)?, colour("color1", 0.2)?);
-        Texture::Checkerboard { first: Box::new(first), second: Box::new(second), to_uv }
-    } else {
-        bitmap(loader, &mut object, to_uv)?
+    let texture = match object.kind() {
+        "checkerboard" => {
+            let to_uv = uv_transform(loader, &mut object)?;
+            let mut colour = |name, default| match object.texture_element(name)? {
+                Some(nested) => read_within(loader, nested, depth + 1),
+                // A number may be one that is no reflectance.
+                None if object.is_number(name) => Ok(Texture::Constant(object.raw(name)?.unwrap_or_default())),
+                None => object.reflectance(loader, name, default).map(Texture::Constant),
+            };
+            let (first, second) = (colour("color0", 0.4)?, colour("color1", 0.2)?);
+            Texture::Checkerboard { first: Box::new(first), second: Box::new(second), to_uv }
+        }
+        "mesh_attribute" => mesh_attribute(loader, &mut object)?,
+        "rawconstant" => {
+            let value = object.raw("value")?;
+            let missing = || object.error("no value", "add <float name=\"value\" …>, or a <vector>");
+            Texture::Constant(value.ok_or_else(missing)?)
+        }
+        _ => {
+            let to_uv = uv_transform(loader, &mut object)?;
+            bitmap(loader, &mut object, to_uv)?
+        }
     };
     object.finish()?;
     Ok(texture)
@@ -62,6 +74,30 @@ fn bitmap<'a>(loader: &Loader<'a>, object: &mut Object<'a>, to_uv: UvTransform) 
         object.string("filename")?.ok_or_else(|| object.error("no filename", "add <string name=\"filename\" …>"))?;
     let image = pixels(loader, name, object.place_of("filename"), raw)?;
     Ok(Texture::Bitmap { image, filter, wrap, to_uv })
+}
+
+/// What the mesh that is being read carries by that name.
+fn mesh_attribute<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Texture, SceneError> {
+    let Some(name) = object.string("name")? else {
+        return Err(object.error("no name", "add <string name=\"name\" value=\"vertex_color\"/>"));
+    };
+    let in_range = |v: f64| v >= 0.0 && v <= f64::from(f32::MAX);
+    let scale = object.float_where("scale", 1.0, in_range, "at least 0 and fit into single precision")? as f32;
+    if !name.starts_with("vertex_") && !name.starts_with("face_") {
+        let message = format!("\"{name}\" is not the name of an attribute");
+        return Err(object.place_of("name").error(message, "it must begin with vertex_ or face_"));
+    }
+    // A BSDF that stands by itself is read again for each shape that refers to it.
+    let Some(shape) = &loader.attributes else { return Ok(Texture::grey(0.0)) };
+    shape.texture(name, scale).map(Texture::Attribute).ok_or_else(|| {
+        let known = shape.names();
+        let help = if known.is_empty() {
+            "only PLY meshes have attributes, of properties such as red, green, blue".to_owned()
+        } else {
+            format!("it has {}", known.join(", "))
+        };
+        object.place_of("name").error(format!("the shape has no attribute \"{name}\""), help)
+    })
 }
 
 /// `to_uv`: what of a transform concerns x and y.

@@ -5,23 +5,23 @@ use vdf_geometry::{Bounds, CurvedShape, Segment, Triangle, intersect_exact};
 
 use super::super::Loader;
 use super::super::document::Place;
-use crate::{FilmSettings, PerspectiveSensor};
+use crate::{FilmSettings, Sensor};
 
 /// Rays along each side of the picture that are followed from the camera to the near plane.
 const RAYS: u32 = 5;
 
 /// Warns if a medium boundary is between the camera and the near plane, or nothing is between the clip planes.
-pub(super) fn warn(loader: &Loader<'_>, sensor: &PerspectiveSensor, film: &FilmSettings, at: &Place) {
+pub(super) fn warn(loader: &Loader<'_>, sensor: &Sensor, film: &FilmSettings, at: &Place) {
     nothing_to_see(loader, sensor, at);
-    let camera = sensor.world_from_camera.w_axis.truncate();
-    let tan_y = sensor.tan_half_fov_x * f64::from(film.height) / f64::from(film.width);
+    let aspect = f64::from(film.width) / f64::from(film.height);
     let rays: Vec<_> = (0..RAYS * RAYS)
         .map(|i| {
             // Not quite to the border: a boundary may begin just where the picture ends.
             let along = |i: u32| (f64::from(i) + 0.5) / f64::from(RAYS) * 2.0 - 1.0;
-            let (x, y) = (along(i % RAYS) * sensor.tan_half_fov_x, along(i / RAYS) * tan_y);
-            let near = sensor.world_from_camera.transform_point3(DVec3::new(x, y, 1.0) * sensor.near_clip);
-            Segment::new(camera, near)
+            let (start, slope) = sensor.ray(along(i % RAYS), along(i / RAYS), aspect);
+            let [start, near] =
+                [start, start + slope * sensor.near_clip].map(|p| sensor.world_from_camera.transform_point3(p));
+            Segment::new(start, near)
         })
         .collect();
     let reach = Bounds::of_points(rays.iter().flat_map(|ray| [ray.p, ray.q]));
@@ -42,7 +42,7 @@ pub(super) fn warn(loader: &Loader<'_>, sensor: &PerspectiveSensor, film: &FilmS
     }
 }
 
-fn nothing_to_see(loader: &Loader<'_>, sensor: &PerspectiveSensor, at: &Place) {
+fn nothing_to_see(loader: &Loader<'_>, sensor: &Sensor, at: &Place) {
     let all = || {
         let surfaces = loader.surfaces.iter().map(|s| (&s.triangles, s.curved));
         surfaces.chain(loader.boundaries.iter().map(|b| (&b.triangles, b.curved)))

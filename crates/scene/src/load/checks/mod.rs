@@ -13,7 +13,7 @@ use vdf_geometry::{Bounds, Triangle};
 
 use super::Loader;
 use super::document::{Element, Place};
-use crate::{FilmSettings, Medium, MediumId, PerspectiveSensor, Phase, SceneError};
+use crate::{FilmSettings, Medium, MediumId, Phase, SceneError, Sensor};
 
 use closed::{Closed, Work};
 use tree::Tree;
@@ -24,7 +24,7 @@ const MOST_WORK: u64 = 10_000_000;
 /// The medium that the sensor and each boundary claim to be in must be the one around them; what the clip planes hide is warned about.
 pub(super) fn media_are_consistent(
     loader: &Loader<'_>,
-    sensor: &PerspectiveSensor,
+    sensor: &Sensor,
     film: &FilmSettings,
     sensor_at: &Place,
     constant_at: Option<&Place>,
@@ -112,7 +112,7 @@ impl<'a> Open<'a> {
     }
 }
 
-fn wrong_around_camera(around: &Closed<'_>, sensor: &PerspectiveSensor, sensor_at: &Place) -> SceneError {
+fn wrong_around_camera(around: &Closed<'_>, sensor: &Sensor, sensor_at: &Place) -> SceneError {
     if around.inner.is_some() && sensor.medium.is_none() {
         let message =
             format!("the camera is inside the medium of the shape {}, but the sensor has no medium", around.name());

@@ -9,7 +9,7 @@ use vdf_geometry::Triangle;
 use super::super::Loader;
 use super::super::document::Place;
 use super::placement::Placement;
-use crate::mesh::{Mesh, MeshError, NO_INDEX};
+use crate::mesh::{Attributes, Mesh, MeshError, NO_INDEX};
 use crate::obj::{self, Limits};
 use crate::{MeshAttributes, SceneError, ply, serialized};
 
@@ -78,6 +78,9 @@ pub(super) fn read(
     }
     loader.triangles += placed.triangles.len();
     placed.attributes = attributes(&mesh, options, placed);
+    if !mesh.attributes.is_empty() {
+        placed.named = Attributes { named: mesh.attributes, triangles: mesh.triangles };
+    }
     Ok(())
 }
 

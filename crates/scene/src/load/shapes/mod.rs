@@ -82,11 +82,18 @@ fn read_at<'a>(loader: &mut Loader<'a>, element: &'a Element, outer: DMat4) -> R
     }
     let (interior, exterior) = media(loader, &mut object)?;
     let radiance = area_emitter(loader, &mut object)?;
-    let bsdf = match object.at_most_one("bsdf")? {
-        Some(nested) => materials::bsdf(loader, nested.object)?,
-        None => materials::default_bsdf(radiance.is_some()),
-    };
     let mut placed = placed;
+    let mut named = std::mem::take(&mut placed.named);
+    if flip {
+        named.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    loader.attributes = Some(named);
+    let bsdf = match object.at_most_one("bsdf")? {
+        Some(nested) => materials::bsdf(loader, nested.object),
+        None => Ok(materials::default_bsdf(radiance.is_some())),
+    };
+    loader.attributes = None;
+    let bsdf = bsdf?;
     // As Mitsuba 3.9.1 was seen to do: the winding of the moved vertices decides on which side a medium is, and how a
     // mesh shades; but cube and rectangle shade with their own normals, which a mirroring does not turn round.
     let own_normals = bsdf != Bsdf::Null && matches!(object.kind(), "cube" | "rectangle");

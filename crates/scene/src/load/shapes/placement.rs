@@ -4,6 +4,7 @@ use glam::{DMat4, DVec3, Vec2};
 use vdf_geometry::Triangle;
 
 use crate::MeshAttributes;
+use crate::mesh::Attributes;
 
 /// A shape may be displaced by its rounding to single precision by this share of its longest side.
 const MOST_LOST: f64 = 1.0 / 256.0;
@@ -14,6 +15,8 @@ pub(super) struct Placement {
     to_world: DMat4,
     pub(super) triangles: Vec<Triangle>,
     pub(super) attributes: MeshAttributes,
+    /// What textures may ask for.
+    pub(super) named: Attributes,
     /// Bounds before the rounding.
     low: DVec3,
     high: DVec3,
@@ -28,6 +31,7 @@ impl Placement {
             to_world,
             triangles: Vec::new(),
             attributes: MeshAttributes::default(),
+            named: Attributes::default(),
             low: DVec3::INFINITY,
             high: DVec3::NEG_INFINITY,
             lost: 0.0,
