@@ -60,10 +60,10 @@ pub(crate) struct RenderArgs {
     /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
-    /// Acceleration of visibility queries; the image is the same with all [default: lb, amr-xsn beyond 10,000 triangles or 256 lights, or none in a scene
-    /// without point and area lights and without --segment-first]
-    #[arg(long, value_name = "METHOD", value_parser = method_parser())]
-    pub(crate) method: Option<Method>,
+    /// Acceleration of visibility queries; the image is the same with all. "auto" follows some paths first and takes what renders this many samples soonest [default: lb,
+    /// amr-xsn beyond 10,000 triangles or 256 lights, or none in a scene without point and area lights and without --segment-first]
+    #[arg(long, value_name = "METHOD", value_parser = method_choice_parser())]
+    pub(crate) method: Option<MethodChoice>,
     /// Texels along each side of a face of a light buffer (method lb), rounded up to a power of two [default: auto, about
     /// as many in all as there are triangles]
     #[arg(long, value_name = "auto|TEXELS", value_parser = parse_texels)]
@@ -133,6 +133,22 @@ pub(crate) struct RenderArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) long: LongArgs,
+}
+
+/// A method as typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MethodChoice {
+    /// Whatever a pilot finds.
+    Auto,
+    One(Method),
+}
+
+impl FromStr for MethodChoice {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        if name == "auto" { Ok(Self::Auto) } else { name.parse().map(Self::One) }
+    }
 }
 
 /// The side of a light buffer's faces as typed.
@@ -358,6 +374,12 @@ pub(crate) struct CompareArgs {
 /// Methods by name; the help lists them all.
 fn method_parser() -> impl TypedValueParser<Value = Method> {
     PossibleValuesParser::new(Method::all().map(Method::name)).try_map(|name| name.parse::<Method>())
+}
+
+/// The same, and what chooses one.
+fn method_choice_parser() -> impl TypedValueParser<Value = MethodChoice> {
+    let names = std::iter::once("auto").chain(Method::all().map(Method::name));
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<MethodChoice>())
 }
 
 /// Integrators by name; the help lists them all.

@@ -19,7 +19,6 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-mod clock;
 mod error;
 mod progress;
 pub mod queries;

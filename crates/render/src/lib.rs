@@ -43,6 +43,7 @@ mod media;
 mod options;
 mod others;
 mod phase;
+mod pilot;
 mod prepared;
 mod render;
 mod sampler;
@@ -65,6 +66,7 @@ pub use options::{
     Estimator, GridExtent, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator, check_voxel_size,
 };
 pub use phase::PhaseFunction;
+pub use pilot::{Choice, Declined, Measured, QueryCost, ThreadTime, Work};
 pub use prepared::{PreparedScene, default_voxel_size};
 pub use render::{FilmPart, LiveFilm, Rendering};
 pub use sampler::{Sampler, SamplerKind};

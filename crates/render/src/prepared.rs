@@ -7,8 +7,8 @@ use vdf_scene::Scene;
 use vdf_visibility::{BuildReport, Method, ProverOptions, Provers, Visibility, VisibilityError};
 
 use crate::{
-    Film, FilmPart, FilmRun, LiveFilm, PrepareOptions, Progress, RenderError, RenderOptions, Rendering, Statistics,
-    World,
+    Choice, Film, FilmPart, FilmRun, LiveFilm, PrepareOptions, Progress, RenderError, RenderOptions, Rendering,
+    Statistics, World,
     job::Job,
     light_shapes,
     render::{add_part, empty_film, render},
@@ -28,6 +28,7 @@ pub struct PreparedScene {
     provers: Provers,
     build: BuildReport,
     notes: Vec<String>,
+    choice: Option<Choice>,
 }
 
 impl PreparedScene {
@@ -56,8 +57,18 @@ impl PreparedScene {
     /// As [`PreparedScene::new`].
     pub fn with_options(&self, options: &PrepareOptions, progress: &dyn Progress) -> Result<Self, RenderError> {
         options.validate()?;
+        on_threads(options.threads, || self.with_provers(options, progress))
+    }
+
+    /// As [`PreparedScene::with_options`], on the current pool of threads.
+    pub(crate) fn with_provers(&self, options: &PrepareOptions, progress: &dyn Progress) -> Result<Self, RenderError> {
         let (scene, world) = (Arc::clone(&self.scene), Arc::clone(&self.world));
-        on_threads(options.threads, || Self::build(scene, world, self.t_hierarchy, options, progress))
+        Self::build(scene, world, self.t_hierarchy, options, progress)
+    }
+
+    /// With the reason for its method.
+    pub(crate) fn chosen(self, choice: Choice) -> Self {
+        Self { choice: Some(choice), ..self }
     }
 
     fn build(
@@ -100,7 +111,7 @@ impl PreparedScene {
             ));
         }
         drop(lights);
-        Ok(Self { scene, world, t_hierarchy, method, provers, build, notes })
+        Ok(Self { scene, world, t_hierarchy, method, provers, build, notes, choice: None })
     }
 
     /// Renders the scene. Builds nothing.
@@ -209,6 +220,12 @@ impl PreparedScene {
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// Why a pilot chose its method, if one did ([`PreparedScene::with_best_method`]).
+    #[must_use]
+    pub const fn choice(&self) -> Option<&Choice> {
+        self.choice.as_ref()
     }
 
     /// Seconds that the hierarchy took, with all that does not depend on the method.

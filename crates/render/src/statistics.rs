@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use vdf_visibility::Counters;
 
-use crate::{Job, SegmentSamples};
+use crate::{Choice, Job, SegmentSamples};
 
 /// All figures of one render. Times in seconds, sizes in bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -14,6 +14,8 @@ pub struct Statistics {
     pub version: &'static str,
     /// Method of acceleration.
     pub method: &'static str,
+    /// Why a pilot chose it, if one did.
+    pub choice: Option<Choice>,
     /// Side of a voxel in world units, if there are voxels.
     pub voxel_size: Option<f64>,
     /// Voxels along x, y and z.
@@ -80,6 +82,8 @@ pub struct Statistics {
     pub proved_occluded: u64,
     /// Rays cast for the first occluder.
     pub rays: u64,
+    /// Segments of which it was found which parts a point light sees (`--estimator lit`).
+    pub lit_segments: u64,
     /// Free flights asked for a proof (segment-first).
     pub flights: u64,
     /// Free flights proved, each a ray saved.
@@ -127,6 +131,8 @@ pub struct BufferSize {
     pub texels: u32,
     /// Its memory in bytes.
     pub bytes: usize,
+    /// How long it took to build, in seconds.
+    pub seconds: f64,
 }
 
 /// A structure that a method built.
@@ -156,6 +162,7 @@ impl Statistics {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             method: prepared.method().name(),
+            choice: prepared.choice().cloned(),
             voxel_size: build.resolution.map(|_| build.voxel_size),
             grid: build.resolution,
             free_share: ratio(free as u64, build.voxels as u64),
@@ -192,6 +199,7 @@ impl Statistics {
             ),
             proved_occluded: counters.proved_occluded,
             rays: counters.rays,
+            lit_segments: counters.lit_segments,
             flights: counters.flights,
             flights_proved: counters.flights_proved,
             p_accelerated_flights: ratio(counters.flights_proved, counters.flights),
@@ -199,7 +207,7 @@ impl Statistics {
             light_buffers: build
                 .lights
                 .iter()
-                .map(|l| l.texels.map(|texels| BufferSize { texels, bytes: l.bytes }))
+                .map(|l| Some(BufferSize { texels: l.texels?, bytes: l.bytes, seconds: l.seconds? }))
                 .collect(),
             fallbacks: build.lights.iter().map(|l| l.fallback).collect(),
             refused: counters.refused,
@@ -224,8 +232,12 @@ impl Statistics {
         let all = self.neighbourhoods.iter().zip(&self.light_buffers).zip(&self.fallbacks);
         for (i, ((neighbourhood, buffer), fallback)) in all.take(Self::TOLD).enumerate() {
             if let Some(buffer) = buffer {
-                let BufferSize { texels, bytes } = *buffer;
-                writeln!(f, "emitter {i}      light buffer, {texels} x {texels} texels a face, {}", mebibytes(bytes))?;
+                let BufferSize { texels, bytes, seconds } = *buffer;
+                let bytes = mebibytes(bytes);
+                writeln!(
+                    f,
+                    "emitter {i}      light buffer, {texels} x {texels} texels a face, {bytes}, {seconds:.4} s"
+                )?;
             }
             if let Some(reason) = fallback {
                 writeln!(f, "emitter {i}      {reason}")?;
@@ -272,6 +284,10 @@ impl fmt::Display for Statistics {
             write!(f, ", voxel {size}, grid {x} x {y} x {z}, {} free", percent(self.free_share))?;
         }
         writeln!(f)?;
+        if let Some(choice) = &self.choice {
+            let Choice { reason, pilot_paths, t_pilot, .. } = choice;
+            writeln!(f, "chosen         {reason} (pilot of {pilot_paths} paths, {t_pilot:.4} s)")?;
+        }
         if !self.build.is_empty() {
             let sizes = self.build.iter().map(|p| format!("{} {}", p.name, mebibytes(p.bytes)));
             writeln!(f, "memory         {}", sizes.collect::<Vec<_>>().join(", "))?;
@@ -304,10 +320,20 @@ impl fmt::Display for Statistics {
         if self.superficial_proved > 0 {
             write!(
                 f,
-                "\nsurfaces       {} of the queries from surfaces answered ({}); of all answers {} are \"occluded\"",
+                "\nsurfaces       {} of the queries from surfaces answered ({})",
                 self.superficial_proved,
-                percent(self.p_accelerated_superficial),
-                self.proved_occluded
+                percent(self.p_accelerated_superficial)
+            )?;
+        }
+        if self.light_buffers.iter().any(Option::is_some) {
+            let answered = self.proved + self.on_light_proved + self.superficial_proved;
+            let of_all = |n: u64| percent(ratio(n, self.queries));
+            write!(
+                f,
+                "\nanswers        {} unoccluded, {} occluded, {} by the hierarchy",
+                of_all(answered - self.proved_occluded),
+                of_all(self.proved_occluded),
+                of_all(self.queries - answered)
             )?;
         }
         write!(f, "\nrays           {} cast", self.rays)?;
@@ -319,6 +345,9 @@ impl fmt::Display for Statistics {
                 percent(self.p_accelerated_flights),
                 self.flights
             )?;
+        }
+        if self.lit_segments > 0 {
+            write!(f, "\nlit            {} segments divided into lit and dark parts", self.lit_segments)?;
         }
         if self.refused > 0 {
             write!(f, "\nWARNING        {} samples were not finite or negative and were left out", self.refused)?;

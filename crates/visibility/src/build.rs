@@ -41,6 +41,25 @@ impl Default for ProverOptions {
     }
 }
 
+impl ProverOptions {
+    /// Texels along each side of a face of a light buffer, for so many occluding triangles and point lights. Where none are asked for there are about as
+    /// many in all as triangles, and no more than fit. With more than four lights a buffer is asked less often, and half as many along each side have to do.
+    #[must_use]
+    pub fn texels_for(&self, triangles: usize, lights: usize) -> u32 {
+        let bytes_for_each = self.max_bytes.min(LIGHTS_BYTES) / (lights as u64).max(1);
+        self.texels.unwrap_or_else(|| {
+            let few = (triangles as f64).sqrt() as u32;
+            let one = few.next_power_of_two().clamp(128, 1024);
+            let mut side = if lights > 4 { one / 2 } else { one };
+            // Lists and records take about as much as texels.
+            while side > 64 && LightBuffer::texel_bytes(side) * 2 > bytes_for_each {
+                side /= 2;
+            }
+            side
+        })
+    }
+}
+
 /// What was built, how large it is and how long it took.
 #[derive(Clone, Debug, Default)]
 pub struct BuildReport {
@@ -78,6 +97,8 @@ pub struct LightReport {
     pub texels: Option<u32>,
     /// Its memory in bytes.
     pub bytes: usize,
+    /// How long its light buffer took to build, in seconds, if it has one.
+    pub seconds: Option<f64>,
     /// Why it has not what the method would keep for it; `None` if that is not so. A light without a buffer gets a neighbourhood, one without
     /// a neighbourhood asks the field, if there is one.
     pub fallback: Option<&'static str>,
@@ -152,7 +173,9 @@ impl Provers {
         }
         let wanting = |(light, kept): (&LightShape<'_>, &Kept)| *light != LightShape::Infinite && kept.prover.is_none();
         let needs_voxels = match method.point_prover() {
-            PointProver::Buffer => lights.iter().zip(&kept).any(wanting),
+            PointProver::Buffer | PointProver::Extended if method.field().is_none() => {
+                lights.iter().zip(&kept).any(wanting)
+            }
             _ => method.field().is_some(),
         };
         if !needs_voxels {
@@ -205,6 +228,7 @@ impl BuildReport {
                 voxels: prover.voxels(),
                 texels: prover.texels(),
                 bytes: prover.bytes(),
+                seconds: kept.seconds,
                 fallback: kept.fallback,
             });
             prover
@@ -231,6 +255,8 @@ fn next(progress: &dyn Progress) -> Result<(), VisibilityError> {
 #[derive(Default)]
 struct Kept {
     prover: Option<LightProver>,
+    /// How long its light buffer took.
+    seconds: Option<f64>,
     /// Why it is not what the method would keep.
     fallback: Option<&'static str>,
 }
@@ -239,19 +265,6 @@ impl Kept {
     fn bytes(&self) -> usize {
         self.prover.as_ref().map_or(0, LightProver::bytes)
     }
-}
-
-/// Texels along each side of a light buffer's faces where nobody says: about as many in all as there are triangles, and no more than fit. With
-/// more than four lights a buffer is asked less often, and half as many along each side have to do.
-fn default_texels(triangles: usize, lights: u64, bytes_for_each: u64) -> u32 {
-    let few = (triangles as f64).sqrt() as u32;
-    let one = few.next_power_of_two().clamp(128, 1024);
-    let mut side = if lights > 4 { one / 2 } else { one };
-    // Lists and records take about as much as texels.
-    while side > 64 && LightBuffer::texel_bytes(side) * 2 > bytes_for_each {
-        side /= 2;
-    }
-    side
 }
 
 /// What light buffers and neighbourhoods together may take at most: with more lights each gets too few queries to pay for its own.
@@ -265,13 +278,14 @@ fn build_buffers(
     kept: &mut [Kept],
     progress: &dyn Progress,
 ) -> Result<(), VisibilityError> {
-    let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count() as u64;
-    begin(progress, "light buffers", count)?;
+    let count = lights.iter().filter(|l| matches!(l, LightShape::Point(_))).count();
+    begin(progress, "light buffers", count as u64)?;
     let mut free = options.max_bytes.min(LIGHTS_BYTES);
-    let mut side = options.texels.unwrap_or_else(|| default_texels(triangles.len(), count, free / count.max(1)));
+    let mut side = options.texels_for(triangles.len(), count);
     for (light, kept) in lights.iter().zip(kept) {
         let LightShape::Point(position) = light else { continue };
         next(progress)?;
+        let start = Instant::now();
         let mut built = LightBuffer::build(triangles, *position, side, free);
         if matches!(built, Err(Refusal::Memory)) && options.texels.is_none() && side > 64 {
             // Those that come after it have no better chance.
@@ -281,6 +295,7 @@ fn build_buffers(
         match built {
             Ok(buffer) => {
                 free -= buffer.bytes() as u64;
+                kept.seconds = Some(start.elapsed().as_secs_f64());
                 kept.prover = Some(LightProver::Buffer(Box::new(buffer)));
             }
             Err(refusal) => kept.fallback = Some(refusal.reason()),

@@ -54,7 +54,7 @@ const fn recipe(
 }
 
 /// All methods, the plainest first. A new one is a row here, and where it needs a new prover a file in `prover/`.
-static RECIPES: [Recipe; 16] = {
+static RECIPES: [Recipe; 17] = {
     use FieldKind::{Amr, Dsz, Dual, Ndf};
     use PointProver::{Buffer, Extended, Field, Hop, Safe};
     const SAFE: &str = "as above, and 1 bit a voxel for each point light: its safe neighbourhood";
@@ -85,6 +85,13 @@ static RECIPES: [Recipe; 16] = {
         recipe("dual-sn", Dual, Safe, SAFE, "one bit"),
         recipe("dual-xsn", Dual, Extended, EXTENDED, "one row"),
         Recipe {
+            name: "xsn",
+            field: None,
+            point: Extended,
+            stores: "only the 8 bytes a row of voxels for each light: all free cuboids",
+            query: "one row",
+        },
+        Recipe {
             name: "lb",
             field: None,
             point: Buffer,
@@ -103,7 +110,10 @@ impl Method {
     pub const NONE: Self = Self(0);
 
     /// `lb`, which answers nearly everything.
-    const STANDARD: Self = Self(15);
+    const STANDARD: Self = Self(16);
+
+    /// `xsn`, which proves of queries towards lights all that free cuboids do, and is built in a moment.
+    pub const NEIGHBOURHOODS: Self = Self(15);
 
     /// All methods, the plainest first.
     pub fn all() -> impl DoubleEndedIterator<Item = Self> + Clone {
@@ -243,6 +253,7 @@ mod tests {
         assert_eq!("AMR".parse::<Method>(), Err(UnknownMethod));
         assert_eq!((Method::default().name(), Method::NONE.name()), ("lb", "none"));
         assert_eq!(Method::best_with_voxels().name(), "amr-xsn");
+        assert_eq!(Method::NEIGHBOURHOODS.name(), "xsn");
     }
 
     #[test]

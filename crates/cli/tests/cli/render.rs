@@ -62,6 +62,26 @@ fn method_by_default() {
     }
 }
 
+/// A pilot says what it chose and why, in the statistics and beside them; the picture is that of any method.
+#[test]
+fn a_pilot_chooses_the_method() {
+    let sandbox = Sandbox::new();
+    let run = |method: &str, exr: &str| {
+        let size = ["-D", "width=40", "-D", "height=40", "--spp", "16", "--reproducible", "--stats", "fog.json"];
+        let outcome = sandbox.run(&[&["render", "--method", method, "-o", exr], &size[..]].concat()).succeeded();
+        let json: serde_json::Value = serde_json::from_slice(&sandbox.read("fog.json")).unwrap();
+        (outcome, json)
+    };
+    assert!(run("none", "none.exr").1["choice"].is_null());
+    let (outcome, json) = run("auto", "auto.exr");
+    assert_eq!(sandbox.read("auto.exr"), sandbox.read("none.exr"));
+    let reason = json["choice"]["reason"].as_str().unwrap();
+    assert_eq!(json["choice"]["method"], json["method"]);
+    assert!(outcome.stdout.contains(&format!("chosen         {reason}")), "{}", outcome.stdout);
+    let note = format!("note: method {}: {reason}", json["method"].as_str().unwrap());
+    assert!(outcome.stderr.contains(&note), "{}", outcome.stderr);
+}
+
 #[test]
 fn flights_are_asked_for_on_demand() {
     let sandbox = Sandbox::new();

@@ -28,7 +28,7 @@ pub(crate) mod tests;
 
 pub use record::record_queries;
 pub use replay::{
-    ClassReplay, HierarchyReplay, MethodReplay, ProofReplay, Replay, ReplayOptions, TimerInfluence, Timing,
-    WrongAnswer, replay,
+    ClassReplay, HierarchyReplay, LookUpShares, MethodReplay, ProofReplay, Replay, ReplayOptions, TimerInfluence,
+    Timing, WrongAnswer, replay,
 };
 pub use stream::{QueryStream, StreamOrigin, write_triangles};

@@ -190,7 +190,13 @@ fn a_replay_measures_all_methods() {
         assert_eq!(p.p_accelerated, p.proved as f64 / spatial.queries as f64);
         assert_eq!(p.unknown_fraction, 1.0 - p.p_accelerated);
         assert!(p.proved > 0 && (buffer || p.proved <= spatial.unoccluded), "{} proves more than there is", m.method);
-        assert!(p.t_batch.median > 0.0 && m.speed_up_batches > 0.0);
+        assert!(p.t_batch.median > 0.0 && p.t_batch_16.median > 0.0 && m.speed_up_batches > 0.0);
+        assert_eq!(p.look_ups.is_some(), buffer, "{}", m.method);
+        if let Some(l) = p.look_ups {
+            assert_eq!(l.queries, spatial.queries);
+            assert!((l.lit + l.occluded + l.open() - 1.0).abs() < 1e-12 && l.mean_tests >= 1.0, "{l:?}");
+            assert!((l.hierarchy - p.unknown_fraction).abs() < 1e-12, "{l:?}");
+        }
         assert!(p.t_acc.median > 0.0 && p.t_effective.median > 0.0);
         assert_eq!(p.speed_up, p.t_hierarchy.median / p.t_effective.median);
         assert_eq!(p.pays_from.is_some(), p.speed_up > 1.0);

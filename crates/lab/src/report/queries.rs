@@ -58,7 +58,7 @@ struct ClassNames {
     t_query: &'static str,
     unoccluded: &'static str,
     timer: [&'static str; 2],
-    method: [&'static str; 13],
+    method: [&'static str; 17],
 }
 
 /// All classes; those of spatial queries have the names of the thesis.
@@ -82,6 +82,10 @@ const CLASSES: [ClassNames; 3] = [
             "speed-up",
             "t_batch",
             "pays from",
+            "t_batch 16",
+            "left open",
+            "by list",
+            "mean tests",
         ],
     },
     ClassNames {
@@ -103,6 +107,10 @@ const CLASSES: [ClassNames; 3] = [
             "speed-up on light",
             "t_batch on light",
             "pays from on light",
+            "t_batch 16 on light",
+            "left open on light",
+            "by list on light",
+            "mean tests on light",
         ],
     },
     ClassNames {
@@ -124,6 +132,10 @@ const CLASSES: [ClassNames; 3] = [
             "speed-up superficial",
             "t_batch superficial",
             "pays from superficial",
+            "t_batch 16 superficial",
+            "left open superficial",
+            "by list superficial",
+            "mean tests superficial",
         ],
     },
 ];
@@ -143,6 +155,7 @@ fn page(name: &str, emitters: usize, origin: &StreamOrigin, r: &Replay) -> Page 
         r.queries, origin.integrator, origin.spp, r.triangles, origin.paths_recorded, origin.paths
     )];
     let mut sections = vec![hierarchy_section(r), methods_section(r)];
+    sections.extend(buffers_section(r));
     sections.extend(provable(r).map(|class| verdict_section(class.kind, r)));
     Page { title: format!("Visibility queries in {name}"), lead, sections }
 }
@@ -225,6 +238,57 @@ fn methods_section(r: &Replay) -> Section {
         tables: provable(r).map(table).collect(),
         ..Section::default()
     }
+}
+
+/// How light buffers answer, if a method keeps any.
+fn buffers_section(r: &Replay) -> Option<Section> {
+    let rows: Vec<Row> = r
+        .methods
+        .iter()
+        .flat_map(|m| m.proofs.iter().filter_map(move |p| Some((m, p, p.look_ups?))))
+        .map(|(m, p, l)| {
+            let cells = [
+                m.method.to_owned(),
+                names(p.kind).name.to_owned(),
+                l.queries.to_string(),
+                percent(l.lit),
+                percent(l.occluded),
+                percent(l.open()),
+                percent(l.by_list),
+                percent(l.hierarchy),
+                short(l.mean_tests),
+                short(p.t_effective.median),
+                short(p.t_batch_16.median),
+                short(p.t_batch.median),
+            ];
+            Row::new(cells.map(Cell::from).to_vec())
+        })
+        .collect();
+    let columns = vec![
+        "method",
+        "queries",
+        "number",
+        "lit",
+        "occluded",
+        "left open",
+        "by list",
+        "hierarchy",
+        "tests",
+        "1 at a time",
+        "16",
+        "256",
+    ];
+    (!rows.is_empty()).then(|| Section {
+        heading: "Look-ups in light buffers".to_owned(),
+        paragraphs: vec![
+            "Comparisons with a texel find a query lit or occluded; what they leave open, u of a light buffer, is decided by a list of triangles or, where it is too close, by the \
+             hierarchy. \"Tests\" are triangles tested for each query left open. The last columns are nanoseconds a query, fallback included, for queries that are asked one at a time and in \
+             batches."
+                .to_owned(),
+        ],
+        tables: vec![Table { caption: String::new(), columns, rows }],
+        ..Section::default()
+    })
 }
 
 const METHOD_COLUMNS: [&str; 17] = [
@@ -381,5 +445,10 @@ fn proof_figures(about: &About, p: &ProofReplay) -> Vec<Figure> {
     let mut all: Vec<_> =
         names.iter().zip(values).map(|(name, (unit, value))| about.figure(name, unit, value, None)).collect();
     all.extend(p.pays_from.map(|n| about.figure(names[12], "", n, None)));
+    all.push(about.figure(names[13], "ns", p.t_batch_16.median, None));
+    if let Some(l) = p.look_ups {
+        let shares = names[14..].iter().zip([l.open(), l.by_list, l.mean_tests]);
+        all.extend(shares.map(|(name, value)| about.figure(name, "", value, None)));
+    }
     all
 }

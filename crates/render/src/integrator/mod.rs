@@ -14,6 +14,7 @@ use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
 pub use self::kind::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
+pub(crate) use self::raymarch::evenly;
 use crate::{
     CameraRay, Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler,
     TransmittanceEstimator,
@@ -97,6 +98,17 @@ impl Path {
             radiance: Rgb::ZERO,
         }
     }
+}
+
+/// From where to which sample of an emitter.
+struct Aim<'a> {
+    point: DVec3,
+    vertex: &'a Vertex<'a>,
+    /// Those that the point is in.
+    regions: &'a RegionSet,
+    light: &'a LightSample,
+    /// Of [`Tracer::flight_to_emitter`].
+    flight: Option<f64>,
 }
 
 /// The end of a path so far, where light may be gathered.
@@ -250,19 +262,6 @@ impl<R: Recorder> Tracer<'_, R> {
         })
     }
 
-    /// Next-event estimation where it is the only way to find light.
-    #[inline]
-    fn direct_light_alone(
-        &self,
-        point: DVec3,
-        vertex: &Vertex,
-        regions: &RegionSet,
-        sampler: &mut Sampler,
-        counters: &mut Counters,
-    ) -> Rgb {
-        self.emitter_sample(point, vertex, regions, sampler, counters).map_or(Rgb::ZERO, |(value, _, _)| value)
-    }
-
     /// One emitter sample: the light that arrives, scattered at the vertex, over the density; that density; and the
     /// density of the vertex's own sampling for this direction.
     #[inline]
@@ -274,11 +273,31 @@ impl<R: Recorder> Tracer<'_, R> {
         sampler: &mut Sampler,
         counters: &mut Counters,
     ) -> Option<(Rgb, f64, f64)> {
+        let (light, flight) = self.draw_emitter(point, sampler);
+        self.connect(point, vertex, regions, &light?, flight, counters)
+    }
+
+    /// A sample of an emitter, as seen from `point`, and what [`Tracer::flight_to_emitter`] draws.
+    #[inline]
+    fn draw_emitter(&self, point: DVec3, sampler: &mut Sampler) -> (Option<LightSample>, Option<f64>) {
         let (u_emitter, u) = (sampler.next_1d(), sampler.next_2d());
         // Drawn even if no one will ask for it: how many numbers an event takes depends on nothing.
         let flight = self.flight_to_emitter(sampler);
-        let light = self.world.lights.sample(point, u_emitter, u)?;
-        self.connect(point, vertex, regions, &light, flight, counters)
+        (self.world.lights.sample(point, u_emitter, u), flight)
+    }
+
+    /// The query that a sample of an emitter depends on, and the light that arrives if it is unoccluded; `None` if that is nothing anyway. For vertices in a medium, with
+    /// nothing that light passes through.
+    #[inline]
+    fn aim(&self, at: &Aim<'_>) -> Option<(ShadowQuery, Rgb)> {
+        let &Aim { point, vertex, regions, light, flight } = at;
+        let value = vertex.eval(self.world, light.direction).0 * light.weight;
+        if value.max_element() <= 0.0 {
+            return None;
+        }
+        let query =
+            ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind: vertex.query_kind(light) };
+        Some((query, value * self.transmittance_to(point, light, regions, flight)))
     }
 
     /// The optical depth that the way to an emitter must not exceed, for the analog estimate of transmittance.
@@ -314,12 +333,8 @@ impl<R: Recorder> Tracer<'_, R> {
             }
             _ => (from, regions),
         };
-        let kind = match vertex {
-            Vertex::InMedium { .. } if light.on_surface => QueryKind::OnLight,
-            Vertex::InMedium { .. } => QueryKind::Spatial,
-            Vertex::OnSurface(_) | Vertex::OnMaterial(..) => QueryKind::Superficial,
-        };
-        let query = ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind };
+        let query =
+            ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind: vertex.query_kind(light) };
         if !self.visibility.unoccluded(&query, counters) {
             return None;
         }
@@ -374,6 +389,16 @@ impl<R: Recorder> Tracer<'_, R> {
 }
 
 impl Vertex<'_> {
+    /// Which ends of a query towards an emitter lie on an occluder.
+    #[inline]
+    const fn query_kind(&self, light: &LightSample) -> QueryKind {
+        match self {
+            Self::InMedium { .. } if light.on_surface => QueryKind::OnLight,
+            Self::InMedium { .. } => QueryKind::Spatial,
+            Self::OnSurface(_) | Self::OnMaterial(..) => QueryKind::Superficial,
+        }
+    }
+
     /// Phase function, or BSDF times cosine, towards `to`; and the density with which direction sampling would draw it.
     #[inline]
     fn eval(&self, world: &World, to: DVec3) -> (Rgb, f64) {

@@ -16,10 +16,10 @@
 use glam::DVec3;
 use vdf_geometry::Segment;
 use vdf_scene::Rgb;
-use vdf_visibility::{Counters, Recorder};
+use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
 
 use super::{
-    Path, PathRay, Tracer, Vertex, choose,
+    Aim, Path, PathRay, Tracer, Vertex, choose,
     equiangular::{Equiangular, LightPlace, Stretch, distance_at_depth, stretches},
     to_f32,
 };
@@ -100,7 +100,7 @@ impl<R: Recorder> Tracer<'_, R> {
     fn by_transmittance(&self, fog: &Fog<'_>, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let &Fog { free, direction, intervals, tau, samples } = fog;
         let width = -(-tau).exp_m1() / f64::from(samples);
-        let mut sum = Rgb::ZERO;
+        let mut gathered = Gathered::default();
         for k in 0..samples {
             if self.stops_at(k) {
                 break;
@@ -110,10 +110,16 @@ impl<R: Recorder> Tracer<'_, R> {
             if let FreeFlight::Collision { t, medium, regions } = intervals.free_flight(depth) {
                 let m = self.world.media.medium(medium);
                 let vertex = Vertex::InMedium { phase: m.phase, direction };
-                sum += m.albedo * self.direct_light_alone(free.at(t), &vertex, &regions, sampler, counters);
+                let point = free.at(t);
+                let (light, flight) = self.draw_emitter(point, sampler);
+                if let Some(light) = light {
+                    let at = Aim { point, vertex: &vertex, regions: &regions, light: &light, flight };
+                    self.gather(&mut gathered, &at, |value| m.albedo * value, counters);
+                }
             }
         }
-        sum * to_f32(width)
+        self.ask_all(&mut gathered, counters);
+        gathered.sum * to_f32(width)
     }
 
     /// Light of these emitters scattered once into the ray, from distances drawn towards one of them or by transmittance.
@@ -129,7 +135,7 @@ impl<R: Recorder> Tracer<'_, R> {
         let scattered = -(-fog.tau).exp_m1();
         let u_place = sampler.next_2d();
         let mut known: Option<(usize, Equiangular<NODES>)> = None;
-        let mut sum = Rgb::ZERO;
+        let mut gathered = Gathered::default();
         for k in 0..fog.samples {
             if self.stops_at(k) {
                 break;
@@ -138,7 +144,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let flight = self.flight_to_emitter(sampler);
             let Some((i, u)) = choose(u, emitters.len()) else { break };
             let emitter = emitters[i];
-            let Some(place) = lights.sample_point(emitter, rotated(u_place, k)) else { continue };
+            let Some(place) = lights.sample_point(emitter, evenly(u_place, k)) else { continue };
             let towards = match lights.position(&place) {
                 None => None,
                 Some((position, normal)) => {
@@ -169,20 +175,69 @@ impl<R: Recorder> Tracer<'_, R> {
             if let Some(light) = lights.seen_from(point, &place) {
                 let vertex = Vertex::InMedium { phase: stretch.phase, direction: fog.direction };
                 let regions = fog.intervals.regions_in(stretch.part, t);
-                if let Some((value, ..)) = self.connect(point, &vertex, &regions, &light, flight, counters) {
-                    sum += stretch.albedo * value * to_f32(arrives / pdf);
-                }
+                let at = Aim { point, vertex: &vertex, regions: &regions, light: &light, flight };
+                self.gather(&mut gathered, &at, |value| stretch.albedo * value * to_f32(arrives / pdf), counters);
             }
         }
+        self.ask_all(&mut gathered, counters);
         // An emitter's weight is for one of all.
-        sum * (emitters.len() as f32 / lights.count() as f32) / fog.samples as f32
+        gathered.sum * (emitters.len() as f32 / lights.count() as f32) / fog.samples as f32
+    }
+
+    /// Gathers what arrives from a sample of an emitter, as the ray is worth `weighted` of it: once it is known that nothing is in the way, which is asked
+    /// for several samples together.
+    #[inline]
+    fn gather(&self, gathered: &mut Gathered, at: &Aim<'_>, weighted: impl Fn(Rgb) -> Rgb, counters: &mut Counters) {
+        // What lets light through has a say in what arrives.
+        if self.world.others.is_some() {
+            let &Aim { point, vertex, regions, light, flight } = at;
+            if let Some((value, ..)) = self.connect(point, vertex, regions, light, flight, counters) {
+                gathered.sum += weighted(value);
+            }
+            return;
+        }
+        let Some((query, value)) = self.aim(at) else { return };
+        gathered.queries[gathered.waiting] = query;
+        gathered.lights[gathered.waiting] = weighted(value);
+        gathered.waiting += 1;
+        if gathered.waiting == TOGETHER {
+            self.ask_all(gathered, counters);
+        }
+    }
+
+    /// Asks what waits, and adds what arrives, in the order of the samples.
+    fn ask_all(&self, gathered: &mut Gathered, counters: &mut Counters) {
+        let waiting = std::mem::take(&mut gathered.waiting);
+        let mut unoccluded = [false; TOGETHER];
+        self.visibility.all_unoccluded(&gathered.queries[..waiting], &mut unoccluded[..waiting], counters);
+        for (light, _) in gathered.lights.iter().zip(unoccluded).filter(|(_, unoccluded)| *unoccluded) {
+            gathered.sum += *light;
+        }
+    }
+}
+
+/// Queries of one ray that are asked together.
+const TOGETHER: usize = 8;
+
+/// Light of a ray's samples: what has arrived, and what does if nothing is in the way.
+struct Gathered {
+    sum: Rgb,
+    waiting: usize,
+    queries: [ShadowQuery; TOGETHER],
+    lights: [Rgb; TOGETHER],
+}
+
+impl Default for Gathered {
+    fn default() -> Self {
+        let none = ShadowQuery { from: DVec3::ZERO, to: DVec3::ZERO, emitter: 0, kind: QueryKind::Spatial };
+        Self { sum: Rgb::ZERO, waiting: 0, queries: [none; TOGETHER], lights: [Rgb::ZERO; TOGETHER] }
     }
 }
 
 /// The `k`-th of a sequence of points in the unit square, each uniform and together even: steps of the two-dimensional golden ratio
 /// \[Roberts2018\] from `u` on.
 #[inline]
-fn rotated(u: [f64; 2], k: u32) -> [f64; 2] {
+pub(crate) fn evenly(u: [f64; 2], k: u32) -> [f64; 2] {
     let step = |u: f64, ratio: f64| {
         let x = u + f64::from(k) * ratio;
         (x - x.floor()).min(1.0 - f64::EPSILON / 2.0)

@@ -11,6 +11,7 @@ pub use area::AreaNeighbourhood;
 pub(crate) use area::{Occluders, Site};
 pub(crate) use field::each_field;
 pub use field::{DistanceField, FieldProver};
+use light_buffer::LANES;
 pub use light_buffer::{LightBuffer, LookUp, Refusal};
 pub use provers::Provers;
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use vdf_distfield::Neighbourhood;
 use vdf_voxel::{VoxelGrid, VoxelSet};
 
-use super::{Answer, DistanceField, FieldProver, LightProver};
+use super::{Answer, DistanceField, FieldProver, LANES, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
 
 /// What neighbourhoods of a point light at `to`, in the grid, say of a segment: the first of one that begins in the grid. One that comes from
@@ -24,9 +24,6 @@ fn by_neighbourhood(
     }
     Answer::unoccluded_if(grid.entry_voxel(from, to).is_some_and(|entry| cuboids.proves(entry)))
 }
-
-/// So many queries wait for their texels together.
-const BATCH: usize = 16;
 
 /// What a method built for a scene.
 #[derive(Debug)]
@@ -81,38 +78,29 @@ impl Provers {
         }
     }
 
-    /// The answers to all of `queries`, each as [`Provers::answer`] gives it; `answers` must be as long. Cheaper for light buffers: where
-    /// queries are asked one by one, each waits for its own texel.
+    /// The answers to all of `queries`, each as [`Provers::answer`] gives it; `answers` must be as long. Cheaper where some one after the other are
+    /// about one light with a light buffer: asked one by one, each waits for its own texel.
     #[inline]
     pub fn answer_all(&self, queries: &[ShadowQuery], answers: &mut [Answer]) {
-        for (queries, answers) in queries.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
-            self.answer_batch(queries, answers);
+        for (queries, answers) in queries.chunks(LANES).zip(answers.chunks_mut(LANES)) {
+            self.answer_some(queries, answers);
         }
     }
 
-    fn answer_batch(&self, queries: &[ShadowQuery], answers: &mut [Answer]) {
-        // First where all of them have to look; loads that depend on nothing then overlap.
-        let mut places = [None; BATCH];
-        for ((query, answer), place) in queries.iter().zip(answers.iter_mut()).zip(&mut places) {
-            match self.lights.get(query.emitter) {
-                Some(LightProver::Buffer(buffer)) if query.to == buffer.position() => {
-                    match buffer.texel_of(query.from) {
-                        Ok((texel, code)) => *place = Some((buffer, texel, code)),
-                        Err(known) => *answer = known,
-                    }
-                }
-                _ => *answer = self.answer(query),
+    fn answer_some(&self, queries: &[ShadowQuery], answers: &mut [Answer]) {
+        if let [first, _, ..] = queries
+            && let Some(LightProver::Buffer(buffer)) = self.lights.get(first.emitter)
+            && queries.iter().all(|q| q.emitter == first.emitter && q.to == buffer.position())
+        {
+            let mut from = [buffer.position(); LANES];
+            for (from, query) in from.iter_mut().zip(queries) {
+                *from = query.from;
             }
+            buffer.answer_batch(&from, answers);
+            return;
         }
-        for (answer, place) in answers.iter_mut().zip(&places) {
-            if let Some((buffer, texel, code)) = place {
-                *answer = buffer.compare(*texel, *code);
-            }
-        }
-        for ((query, answer), place) in queries.iter().zip(answers).zip(&places) {
-            if let (Answer::Unknown, Some((buffer, ..))) = (*answer, place) {
-                *answer = buffer.answer(query.from);
-            }
+        for (query, answer) in queries.iter().zip(answers) {
+            *answer = self.answer(query);
         }
     }
 

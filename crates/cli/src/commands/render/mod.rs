@@ -15,8 +15,8 @@ use anyhow::{Context as _, anyhow};
 use vdf_image::{StagedFile, check_distinct, shown};
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Estimator, Film, Integrator, NoiseLimit, PrepareOptions, PreparedScene, RenderOptions, Roulette, SamplerKind,
-    SegmentSamples, TransmittanceEstimator, thread_count,
+    Estimator, Film, FilmPart, Integrator, NoiseLimit, PrepareOptions, PreparedScene, RenderOptions, Roulette,
+    SamplerKind, SegmentSamples, TransmittanceEstimator, Work, thread_count,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
@@ -26,7 +26,10 @@ use self::display::Display;
 pub(super) use self::output::{Places, check_places, stage_json, write_json, write_picture};
 use self::passes::{Checkpoint, Plan, Rendered};
 use crate::{
-    args::{EstimatorName, PictureArgs, ProgressName, RenderArgs, RouletteName, SamplerName, TransmittanceName},
+    args::{
+        EstimatorName, MethodChoice, PictureArgs, ProgressName, RenderArgs, RouletteName, SamplerName,
+        TransmittanceName,
+    },
     failure::{Failure, say, speak_json},
     progress::Reporter,
 };
@@ -52,9 +55,14 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     } else if options.noise.is_some() {
         options.spp = Some(options.spp.unwrap_or(NoiseLimit::MOST_SAMPLES));
     }
-    let prepare = PrepareOptions {
+    let method = match args.method {
+        Some(MethodChoice::One(method)) => Some(method),
+        Some(MethodChoice::Auto) => Some(Method::NONE),
         // Proofs of flights need a field, whatever the lights.
-        method: args.method.or_else(|| args.segment_first.then(Method::best_with_voxels)),
+        None => args.segment_first.then(Method::best_with_voxels),
+    };
+    let prepare = PrepareOptions {
+        method,
         voxel_size: args.voxel,
         grid: args.grid.into(),
         texels: args.light_buffer.and_then(|texels| texels.0),
@@ -77,7 +85,14 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     named.warn();
     let Named { name, scene, .. } = named;
 
-    let prepared = PreparedScene::new(scene, &prepare, reporter)?;
+    let mut prepared = PreparedScene::new(scene, &prepare, reporter)?;
+    if args.method == Some(MethodChoice::Auto) {
+        let work = work(args, &prepared, &options)?;
+        prepared = prepared.with_best_method(&prepare, &options, work, reporter)?;
+    }
+    if let Some(choice) = prepared.choice().filter(|_| !args.quiet) {
+        say(format_args!("note: method {}: {}", choice.method, choice.reason));
+    }
     prepared.notes().iter().for_each(|note| say(format_args!("note: {note}")));
     let checkpoint = args.long.checkpoint.as_ref();
     let checkpoint = checkpoint.map(|path| Checkpoint { path: path.clone(), every: args.long.every });
@@ -120,6 +135,15 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
         }
     }
     Ok(())
+}
+
+/// How much is to be rendered, for a pilot.
+fn work(args: &RenderArgs, prepared: &PreparedScene, options: &RenderOptions) -> Result<Work, Failure> {
+    let job = prepared.job(options)?;
+    let [width, height] = job.size();
+    let FilmPart { samples, tiles: (_, parts) } = args.long.part(job.spp());
+    let paths = u64::from(width) * u64::from(height) * u64::from(samples.end - samples.start) / parts as u64;
+    Ok(Work { paths, seconds: args.long.time_limit.map(|limit| limit.as_secs_f64()) })
 }
 
 /// Writes the results and tells of them.

@@ -111,6 +111,10 @@ pub struct ProofReplay {
     pub t_effective: Timing,
     /// A query of those that are asked in batches of 256.
     pub t_batch: Timing,
+    /// The same in batches of 16.
+    pub t_batch_16: Timing,
+    /// How light buffers answer, if the method keeps any.
+    pub look_ups: Option<LookUpShares>,
     /// `t_acc` as the thesis computes it (6.3.2), from the whole: t_eff − (1 − p_acc)·t_query. Larger than
     /// [`Self::t_acc`] where proofs alone overlap in the processor but a fallback has to wait for its proof; smaller
     /// where proved queries are the expensive ones.
@@ -123,6 +127,31 @@ pub struct ProofReplay {
     pub threshold: f64,
     /// From how many of these queries on the build is worth its time, by [`Self::t_effective`]; `None` if never.
     pub pays_from: Option<f64>,
+}
+
+/// How the light buffers answer the queries of a class that are towards their lights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct LookUpShares {
+    /// Queries towards a light with a buffer.
+    pub queries: usize,
+    /// Share that comparisons with a texel find unoccluded.
+    pub lit: f64,
+    /// Share that comparisons find occluded.
+    pub occluded: f64,
+    /// Share that is decided by testing triangles.
+    pub by_list: f64,
+    /// Share that goes to the hierarchy.
+    pub hierarchy: f64,
+    /// Triangles tested, for each query that comparisons leave open.
+    pub mean_tests: f64,
+}
+
+impl LookUpShares {
+    /// The share that comparisons leave open.
+    #[must_use]
+    pub fn open(&self) -> f64 {
+        self.by_list + self.hierarchy
+    }
 }
 
 impl HierarchyReplay {

@@ -15,7 +15,7 @@ use vdf_render::{GridExtent, PreparedScene, Progress, check_voxel_size, on_threa
 use vdf_visibility::Method;
 
 pub use self::figures::{
-    ClassReplay, HierarchyReplay, MethodReplay, ProofReplay, Replay, TimerInfluence, Timing, WrongAnswer,
+    ClassReplay, HierarchyReplay, LookUpShares, MethodReplay, ProofReplay, Replay, TimerInfluence, Timing, WrongAnswer,
 };
 #[cfg(test)]
 pub(super) use self::passes::check;

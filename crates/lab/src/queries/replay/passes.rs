@@ -3,9 +3,10 @@
 use std::{hint::black_box, time::Instant};
 
 use rayon::prelude::*;
-use vdf_visibility::{Answer, Counters, Provers, QueryKind, ShadowQuery, Visibility};
+use vdf_render::ThreadTime;
+use vdf_visibility::{Answer, Counters, LightProver, LookUp, Provers, QueryKind, ShadowQuery, Visibility};
 
-use crate::clock::ThreadTime;
+use super::figures::LookUpShares;
 
 /// How many queries were proved when every answer was compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +39,36 @@ pub(crate) fn check(visibility: &Visibility<'_>, queries: &[ShadowQuery], truth:
     let mut all = Counters::default();
     blocks.into_iter().for_each(|counters| all += counters);
     Ok(Checked(all))
+}
+
+/// How light buffers answer; `None` if there are none for these queries.
+pub(super) fn look_up_shares(provers: &Provers, queries: &[ShadowQuery]) -> Option<LookUpShares> {
+    let (mut count, mut tests) = (0, 0);
+    let (mut lit, mut occluded, mut by_list, mut open) = (0, 0, 0, 0);
+    for query in queries {
+        let Some(LightProver::Buffer(buffer)) = provers.light(query.emitter) else { continue };
+        if query.to != buffer.position() {
+            continue;
+        }
+        let found = buffer.look_up(query.from);
+        count += 1;
+        tests += u64::from(found.tests);
+        match found {
+            LookUp { answer: Answer::Unknown, .. } => open += 1,
+            LookUp { tests: 1.., .. } => by_list += 1,
+            LookUp { answer: Answer::Unoccluded, .. } => lit += 1,
+            LookUp { answer: Answer::Occluded, .. } => occluded += 1,
+        }
+    }
+    let share = |n: usize| n as f64 / count as f64;
+    (count > 0).then(|| LookUpShares {
+        queries: count,
+        lit: share(lit),
+        occluded: share(occluded),
+        by_list: share(by_list),
+        hierarchy: share(open),
+        mean_tests: tests as f64 / ((by_list + open).max(1)) as f64,
+    })
 }
 
 /// One pass over queries that asks only for proofs: its seconds, and how many there are.

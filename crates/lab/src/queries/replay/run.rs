@@ -10,7 +10,7 @@ use vdf_visibility::{Method, Provers, QueryKind, ShadowQuery, Visibility};
 use super::{
     ReplayOptions,
     figures::{ClassReplay, HierarchyReplay, MethodReplay, ProofReplay, Replay, TimerInfluence, Timing, WrongAnswer},
-    passes::{Checked, batch_pass, check, empty_pass, proof_pass, query_pass, timer_pass},
+    passes::{Checked, batch_pass, check, empty_pass, look_up_shares, proof_pass, query_pass, timer_pass},
 };
 use crate::{
     LabError,
@@ -22,7 +22,7 @@ use crate::{
 const CLASSES: [QueryKind; 3] = [QueryKind::Spatial, QueryKind::OnLight, QueryKind::Superficial];
 
 /// Queries that are asked together.
-const BATCH: usize = 256;
+const BATCHES: [usize; 2] = [16, 256];
 
 /// The queries of one class, in the order of the stream.
 struct Class {
@@ -50,8 +50,8 @@ struct Candidate {
     /// Nanoseconds a query of each class, for each pass: proofs alone, and whole queries.
     acc: [Vec<f64>; CLASSES.len()],
     effective: [Vec<f64>; CLASSES.len()],
-    /// The same in batches.
-    batch: [Vec<f64>; CLASSES.len()],
+    /// The same in batches of each size.
+    batch: [[Vec<f64>; CLASSES.len()]; BATCHES.len()],
 }
 
 /// Passes that do not depend on a method.
@@ -160,7 +160,7 @@ impl<'a> Replaying<'a> {
             checked,
             acc: array::from_fn(|_| vec![]),
             effective: array::from_fn(|_| vec![]),
-            batch: array::from_fn(|_| vec![]),
+            batch: array::from_fn(|_| array::from_fn(|_| vec![])),
         })
     }
 
@@ -196,8 +196,10 @@ impl<'a> Replaying<'a> {
                 acc[i].push(1e9 * seconds / class.queries.len() as f64);
                 let pass = query_pass(&prepared.visibility(), &class.queries);
                 effective[i].push(class.per_query(*method, pass)?);
-                let pass = batch_pass(&prepared.visibility(), &class.queries, BATCH);
-                batch[i].push(class.per_query(*method, pass)?);
+                for (size, times) in BATCHES.into_iter().zip(&mut *batch) {
+                    let pass = batch_pass(&prepared.visibility(), &class.queries, size);
+                    times[i].push(class.per_query(*method, pass)?);
+                }
             }
             self.progress.work_done(1);
             Ok(())
@@ -228,7 +230,9 @@ impl<'a> Replaying<'a> {
                     unknown_fraction: 1.0 - p,
                     t_acc,
                     t_effective,
-                    t_batch: Timing::of(&c.batch[i]),
+                    t_batch: Timing::of(&c.batch[1][i]),
+                    t_batch_16: Timing::of(&c.batch[0][i]),
+                    look_ups: look_up_shares(c.prepared.provers(), &class.queries),
                     t_acc_derived: t_effective.median - (1.0 - p) * t_hierarchy.median,
                     t_hierarchy,
                     speed_up: t_hierarchy.median / t_effective.median,

@@ -116,6 +116,12 @@ impl Window {
         self.side
     }
 
+    /// What maps directions to texels: the corner, and texels per unit.
+    #[inline]
+    pub(super) const fn map(&self) -> ([f64; 2], [f64; 2]) {
+        ([self.u0, self.v0], [self.scale_u, self.scale_v])
+    }
+
     /// The texel of a direction, and where in it from 0 to 1; `None` if it is not in the window: then there is no geometry behind it. A
     /// direction on a border may be given to either texel, as the slack allows.
     #[inline(always)]
@@ -175,7 +181,7 @@ impl Window {
 /// The integer below `x`, from 0 to 2³¹; of an integer itself or the one below. Half the instructions of a conversion that saturates.
 #[inline(always)]
 #[allow(clippy::cast_possible_truncation, reason = "the low bits of the mantissa are the integer")]
-fn whole(x: f64) -> u32 {
+pub(super) fn whole(x: f64) -> u32 {
     // From 2⁵² to 2⁵³ the last place is 1, so that a sum is rounded to the nearest integer; in the middle, for `x` may be less than ½.
     const SHIFT: f64 = (3_u64 << 51) as f64;
     (x - 0.5 + SHIFT).to_bits() as u32

@@ -18,6 +18,7 @@
 //! *Limits.* A light on an occluder has no buffer: every closed segment to it is blocked. Nor has one that is a thousand times as far away
 //! as the geometry is large. The hierarchy decides what is too close for the rounding of a record.
 
+mod batch;
 mod build;
 mod cone;
 mod frame;
@@ -28,6 +29,7 @@ mod tests;
 
 use glam::DVec3;
 
+pub(in crate::prover) use self::batch::LANES;
 use self::{
     build::{PARTS, TILE_TEXELS},
     frame::{DepthCode, Face, NEVER, TILE, Window},
@@ -208,25 +210,6 @@ impl LightBuffer {
         match self.place(from) {
             Ok(place) => self.decide(&place, self.texels[place.texel]),
             Err(answer) => LookUp { answer, tests: 0 },
-        }
-    }
-
-    /// What has to be loaded for a query, and its depth; or its answer if it needs none of it.
-    #[inline]
-    pub(super) fn texel_of(&self, from: DVec3) -> Result<(usize, u16), Answer> {
-        self.place(from).map(|place| (place.texel, place.code))
-    }
-
-    /// The answer at a texel for a query of this depth, if comparisons decide.
-    #[inline]
-    pub(super) fn compare(&self, texel: usize, code: u16) -> Answer {
-        let texel = self.texels[texel];
-        if code < texel.lit {
-            Answer::Unoccluded
-        } else if code >= texel.occluded {
-            Answer::Occluded
-        } else {
-            Answer::Unknown
         }
     }
 

@@ -48,6 +48,12 @@ impl Record {
         Self { plane: cone.plane, edges: [edge(0), edge(1), edge(2)], plane_error }
     }
 
+    /// Its first number: who reads it has loaded the record.
+    #[inline]
+    pub(super) const fn first(&self) -> f64 {
+        self.plane.x
+    }
+
     /// Whether the triangle meets the closed segment from the light to the light + `d`; `x` is `d` over its largest component `w`.
     #[inline(always)]
     pub(super) fn test(&self, d: DVec3, x: Vec3, w: f64) -> Verdict {

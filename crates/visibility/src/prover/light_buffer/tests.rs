@@ -146,6 +146,7 @@ fn answers_are_those_of_a_loop() {
             let buffer = LightBuffer::build(&triangles, light, side, 1 << 30).expect(name);
             let (mut known, mut tests, mut blocked) = (0, 0, 0);
             const ASKED: usize = 12_000;
+            let mut together = ([DVec3::ZERO; LANES], [Answer::Unknown; LANES]);
             for kind in 0..ASKED {
                 let from = hard_point(&mut random, &triangles, light, kind);
                 let LookUp { answer, tests: n } = buffer.look_up(from);
@@ -154,6 +155,12 @@ fn answers_are_those_of_a_loop() {
                     answer == Answer::Unknown || (answer == Answer::Occluded) == truth,
                     "{name}, {side}: {from:?} is {truth}, not {answer:?} after {n} tests"
                 );
+                (together.0[kind % LANES], together.1[kind % LANES]) = (from, answer);
+                // Every number of queries at once, up to all.
+                let count = kind % LANES + 1;
+                let mut answers = [Answer::Unknown; LANES];
+                buffer.answer_batch(&together.0, &mut answers[..count]);
+                assert_eq!(answers[..count], together.1[..count], "{name}, {side}: {:?}", together.0);
                 // Towards edges, vertices and points of the very surface an answer would be luck.
                 if !matches!(kind % 12, 1 | 2 | 3 | 5 | 6 | 8 | 11) {
                     known += usize::from(answer != Answer::Unknown);
@@ -192,6 +199,9 @@ fn nothing_is_said_about_what_is_no_point() {
     let one_is_none = DVec3::ONE.with_y(f64::NAN);
     for from in [DVec3::NAN, one_is_none, DVec3::INFINITY, DVec3::X * f64::NAN, DVec3::Y * f64::NEG_INFINITY, light] {
         assert_eq!(buffer.answer(from), Answer::Unknown, "{from}");
+        let mut together = [Answer::Occluded; LANES];
+        buffer.answer_batch(&[from; LANES], &mut together);
+        assert_eq!(together, [Answer::Unknown; LANES], "{from}");
     }
     assert_eq!(buffer.answer(DVec3::X * 1e300), Answer::Occluded);
 }
