@@ -3,10 +3,12 @@
 mod agreement;
 mod airlight;
 mod check;
+mod colours;
 #[path = "../common/mod.rs"]
 mod common;
 mod estimators;
 mod fog;
 mod furnace;
+mod grids;
 mod surfaces;
 mod transmittance;

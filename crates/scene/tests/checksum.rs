@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use glam::{DMat4, Vec3};
 use vdf_scene::{
-    Bsdf, Emitter, Lens, LoadOptions, MeshAttributes, Phase, Pixels, ReconstructionFilter, Rgb, Scene, Texture,
+    Albedo, Bsdf, Emitter, Extinction, GridVolume, Lens, LoadOptions, MeshAttributes, Phase, Pixels,
+    ReconstructionFilter, Rgb, Scene, Texture, VolumeFilter, VoxelGrid, Wrap,
 };
 use vdf_scenes::builtin;
 
@@ -14,6 +15,11 @@ fn loaded(name: &str, defines: &[(&str, &str)]) -> Scene {
     let defines = defines.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())).collect();
     Scene::from_source(&builtin(name).expect("it is built in"), &LoadOptions { defines, sensor: None })
         .expect("it loads")
+}
+
+fn grid(value: f32, wrap: Wrap) -> GridVolume {
+    let grid = VoxelGrid::new([2, 1, 1], 1, vec![1.0, value], [Vec3::ZERO, Vec3::ONE]).expect("a grid");
+    GridVolume { grid: Arc::new(grid), filter: VolumeFilter::Trilinear, wrap, grid_from_world: DMat4::IDENTITY }
 }
 
 #[test]
@@ -26,7 +32,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         change(&mut changed);
         assert_eq!(changed.checksum(), scene.checksum());
     }
-    let other: [fn(&mut Scene); 23] = [
+    let other: [fn(&mut Scene); 29] = [
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
@@ -36,7 +42,13 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| drop(s.surfaces.pop()),
         |s| s.boundaries[0].interior = None,
         |s| s.boundaries[0].exterior = s.boundaries[0].interior,
-        |s| s.media[0].sigma_t *= 1.5,
+        |s| s.media[0].sigma_t = 1.5.into(),
+        |s| s.media[0].sigma_t = Extinction::Constant(glam::dvec3(1.5, 1.5, 1.0)),
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(1.0, Wrap::Clamp), scale: 1.0 },
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(1.0, Wrap::Clamp), scale: 2.0 },
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(0.5, Wrap::Clamp), scale: 1.0 },
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(1.0, Wrap::Repeat), scale: 1.0 },
+        |s| s.media[0].albedo = Albedo::Grid(grid(1.0, Wrap::Clamp)),
         |s| s.media[0].phase = Phase::HenyeyGreenstein { g: 0.0 },
         |s| s.emitters.reverse(),
         |s| s.sensor.tan_half_fov_x *= 1.5,
