@@ -54,10 +54,11 @@ fn images_do_not_depend_on_method_voxel_size_or_threads() {
     }
 }
 
-/// Curved shapes and veils, which no method knows, glass with fog inside, turned normals and lights with pictures; also where free flights are proved.
+/// Curved shapes and veils, which no method knows, glass with fog inside, turned normals, lights with pictures, and media that change in space; also where
+/// free flights are proved.
 #[test]
 fn images_of_what_methods_know_nothing_of_do_not_depend_on_them() {
-    for name in ["curved", "cutouts", "glass", "turned"] {
+    for name in ["curved", "cutouts", "glass", "turned", "grids", "colours"] {
         let path = format!("{}/tests/mitsuba/scenes/{name}.xml", env!("CARGO_MANIFEST_DIR"));
         let defines = [("width", "24"), ("height", "24"), ("spp", "2")];
         let defines = defines.map(|(k, v)| (k.to_owned(), v.to_owned())).into();

@@ -38,11 +38,7 @@ fn length(s: &Segment) -> Big {
 }
 
 fn fog(sigma_t: f64, boundaries: &[Boundary]) -> Media {
-    Media::new(
-        &[Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic }],
-        boundaries,
-        boundaries.is_empty().then_some(FOG),
-    )
+    Media::new(&[Medium::new(sigma_t, Rgb::ONE, Phase::Isotropic)], boundaries, boundaries.is_empty().then_some(FOG))
 }
 
 const FOG: MediumId = MediumId(0);
@@ -137,7 +133,7 @@ fn sampled_distances() {
             panic!("{}", case())
         };
         bound.check(error(t, &exact), 8.0, &case);
-        let flight = media.short_flight(&s, FOG, tau).expect("nothing in the way");
+        let flight = media.short_flight(&s, FOG, tau).collision().expect("nothing in the way");
         let way = length(&flight) / length(&s);
         short.check(((way - &exact) / &exact).to_f64().value().abs() / U, 10.0, &case);
     }

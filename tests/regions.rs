@@ -248,7 +248,7 @@ fn stacks_of_touching_boxes_are_one_fog() {
                     ..Boundary::default()
                 }
             };
-            let medium = Medium { sigma_t: 1.0, albedo: Rgb::ONE, phase: Phase::Isotropic };
+            let medium = Medium::new(1.0, Rgb::ONE, Phase::Isotropic);
             let media = Media::new(&[medium], &(0..boxes).map(boundary).collect::<Vec<_>>(), None);
             for (p, q) in [
                 (dvec3(0.1, 0.2, -1.0), dvec3(0.3, 0.1, 2.0)),

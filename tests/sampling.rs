@@ -146,7 +146,10 @@ fn free_flights_are_drawn_with_the_transmittance() {
             let tau = -(-Sampler::new(31, i, k as u32, 0).next_1d()).ln_1p();
             let cell = match media.free_flight(&segment, &media.regions_at(segment.p), tau) {
                 FreeFlight::Collision { t, medium, .. } => {
-                    assert!(media.medium(medium).sigma_t > 0.0, "a collision in an empty medium");
+                    assert!(
+                        scene.media[medium.0 as usize].sigma_t.grey() > Some(0.0),
+                        "a collision in an empty medium"
+                    );
                     ((t / last * CELLS as f64) as usize).min(CELLS - 1)
                 }
                 FreeFlight::Passed(regions) => {
@@ -173,7 +176,7 @@ fn short_flights_are_flights() {
         let to = Phase::Isotropic.sample_direction(DVec3::Z, u.next_2d());
         let segment = Segment::new(p, p + to * if i % 4 == 0 { 0.25 } else { 100.0 });
         let tau = -(-u.next_1d()).ln_1p();
-        if let Some(flight) = media.short_flight(&segment, medium, tau) {
+        if let Some(flight) = media.short_flight(&segment, medium, tau).collision() {
             found += 1;
             let FreeFlight::Collision { t, medium: there, .. } =
                 media.free_flight(&segment, &media.regions_at(segment.p), tau)

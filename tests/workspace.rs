@@ -11,7 +11,7 @@ const ARROWS: [(&str, &[&str]); 12] = [
     ("vdf-scene", &["vdf-geometry"]),
     ("vdf-image", &[]),
     ("vdf-scenes", &["vdf-scene"]),
-    ("vdf-render", &["vdf-geometry", "vdf-visibility", "vdf-scene", "vdf-image"]),
+    ("vdf-render", &["vdf-geometry", "vdf-voxel", "vdf-distfield", "vdf-visibility", "vdf-scene", "vdf-image"]),
     (
         "vdf-lab",
         &[

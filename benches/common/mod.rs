@@ -57,7 +57,7 @@ fn court() -> Option<SceneSource> {
     let mut files = generated("san-miguel")?.with_triangles(100_000).ok()?.files().map(|file| {
         let mut text = Vec::new();
         file.write(&mut text).expect("a vector takes it");
-        EmbeddedFile { path: Cow::Borrowed(file.path), text: Cow::Owned(String::from_utf8(text).expect("UTF-8")) }
+        EmbeddedFile { path: Cow::Borrowed(file.path), bytes: Cow::Owned(text) }
     });
     Some(SceneSource::embedded(files.next()?, files.collect()))
 }

@@ -10,7 +10,7 @@ const SCENE: &str = "<scene version='3.0.0'><integrator type='path'/><sensor typ
     <shape type='obj'><string name='filename' value='m.obj'/></shape></scene>";
 
 fuzz_target!(|text: &str| {
-    let file = |path: &'static str, text: &str| EmbeddedFile { path: Cow::Borrowed(path), text: Cow::Owned(text.to_owned()) };
+    let file = |path: &'static str, text: &str| EmbeddedFile { path: Cow::Borrowed(path), bytes: Cow::Owned(text.as_bytes().to_owned()) };
     let source = SceneSource::embedded(file("s.xml", SCENE), vec![file("m.obj", text)]);
     if let Ok(scene) = Scene::from_source(&source, &LoadOptions::default()) {
         assert!(scene.surfaces.iter().flat_map(|s| &s.triangles).all(|t| t.is_finite()));

@@ -10,7 +10,7 @@ fuzz_target!(|text: &str| {
     let mut parts = text.split("@@@");
     let mut file = |path: &'static str| EmbeddedFile {
         path: Cow::Borrowed(path),
-        text: Cow::Owned(parts.next().unwrap_or_default().to_owned()),
+        bytes: Cow::Owned(parts.next().unwrap_or_default().as_bytes().to_owned()),
     };
     let (scene, others) = (file("s.xml"), vec![file("m.obj"), file("i.xml")]);
     match Scene::from_source(&SceneSource::embedded(scene, others), &LoadOptions::default()) {

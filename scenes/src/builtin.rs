@@ -9,11 +9,12 @@ use crate::generate::{GeneratedFile, GeneratedScene, generated};
 /// The scene that is rendered when none is named.
 pub const DEFAULT_SCENE: &str = "cbox_vol2";
 
-const NAMES: [&str; 7] = ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "cbox_light", "san-miguel", "scape"];
+const NAMES: [&str; 8] =
+    ["cbox_vol2", "cbox_vol3", "cbox_vol4", "cbox_vol6", "cbox_light", "san-miguel", "scape", "smoke"];
 
 macro_rules! scene_file {
     ($path:literal) => {
-        EmbeddedFile { path: Cow::Borrowed($path), text: Cow::Borrowed(include_str!(concat!("../", $path))) }
+        EmbeddedFile { path: Cow::Borrowed($path), bytes: Cow::Borrowed(include_bytes!(concat!("../", $path))) }
     };
 }
 
@@ -48,16 +49,13 @@ pub fn builtin(name: &str) -> Option<SceneSource> {
 }
 
 impl From<GeneratedScene> for SceneSource {
-    /// The scene in memory: some 70 bytes of text a triangle.
+    /// The scene in memory: some 70 bytes of text a triangle, four bytes a voxel.
     fn from(scene: GeneratedScene) -> Self {
         let embedded = |file: GeneratedFile| {
-            let mut text = Vec::new();
-            // A vector takes whatever is written, and all that is written is UTF-8.
-            let _ = file.write(&mut text);
-            EmbeddedFile {
-                path: Cow::Borrowed(file.path),
-                text: Cow::Owned(String::from_utf8(text).unwrap_or_default()),
-            }
+            let mut bytes = Vec::new();
+            // A vector takes whatever is written.
+            let _ = file.write(&mut bytes);
+            EmbeddedFile { path: Cow::Borrowed(file.path), bytes: Cow::Owned(bytes) }
         };
         let mut files: Vec<_> = scene.files().map(embedded).collect();
         // The scene file is always there, and it is the first.

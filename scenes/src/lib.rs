@@ -15,4 +15,4 @@ mod generate;
 
 pub use builtin::{DEFAULT_SCENE, builtin, builtin_names};
 pub use error::ScenesError;
-pub use generate::{GeneratedFile, GeneratedScene, generated};
+pub use generate::{GeneratedFile, GeneratedScene, Size, generated};

@@ -26,7 +26,7 @@ fn the_builtin_boxes_load_and_say_what_the_design_says() {
             "cbox_light" => 0.0005,
             _ => 0.001,
         };
-        assert!((scene.media[0].sigma_t - sigma_t).abs() < 1e-12);
+        assert!((scene.media[0].sigma_t.grey().unwrap() - sigma_t).abs() < 1e-12);
         assert_eq!(scene.emitters.len(), if *name == "cbox_vol3" { 2 } else { 1 });
         assert_eq!(
             scene.surfaces.len(),
@@ -60,7 +60,7 @@ fn a_builtin_scene_written_to_disk_loads_from_there() {
     for file in source.files() {
         let path = folder.path().join(file.path.as_ref());
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, file.text.as_bytes()).unwrap();
+        std::fs::write(path, &file.bytes).unwrap();
     }
     let options = LoadOptions::default();
     let disk = Scene::load(&folder.path().join("cbox_vol2.xml"), &options).unwrap();

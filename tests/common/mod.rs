@@ -116,7 +116,7 @@ pub fn empty_scene(size: u32, spp: u32, tan_half_fov: f64) -> Scene {
 
 /// Adds a medium and returns its number.
 pub fn add_medium(scene: &mut Scene, sigma_t: f64, albedo: f32, phase: Phase) -> MediumId {
-    scene.media.push(Medium { sigma_t, albedo: Rgb::splat(albedo), phase });
+    scene.media.push(Medium::new(sigma_t, Rgb::splat(albedo), phase));
     MediumId(u32::try_from(scene.media.len()).expect("few") - 1)
 }
 

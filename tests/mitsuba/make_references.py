@@ -93,6 +93,8 @@ PLAN = [
     Case("cropped", 3, 128, 256, border=4, pixels_are_independent=False),
     Case("curved", 8, 64, 128),
     Case("textures", 8, 64, 128),
+    Case("grids", 8, 64, 128),
+    Case("colours", 8, 64, 128),
     Case("metals_and_coats", -1, 64, 256),
     Case("glass_blocks", -1, 64, 256),
     Case("disney", 8, 64, 256),

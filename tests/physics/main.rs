@@ -3,11 +3,13 @@
 mod agreement;
 mod airlight;
 mod check;
+mod colours;
 #[path = "../common/mod.rs"]
 mod common;
 mod estimators;
 mod fog;
 mod furnace;
+mod grids;
 mod stopping;
 mod surfaces;
 mod transmittance;

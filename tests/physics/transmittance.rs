@@ -92,8 +92,7 @@ fn of_segments_is_that_of_clipping_to_slabs() {
     for i in 0..60_000 {
         let mut random = Random(Sampler::new(5, i, 0, 0));
         let fogs = random.fogs();
-        let media: Vec<_> =
-            fogs.iter().map(|f| vdf::scene::Medium { sigma_t: f.sigma_t, albedo: Rgb::ZERO, phase: f.phase }).collect();
+        let media: Vec<_> = fogs.iter().map(|f| vdf::scene::Medium::new(f.sigma_t, Rgb::ZERO, f.phase)).collect();
         let boundaries: Vec<_> = (0..)
             .zip(&fogs)
             .map(|(k, f)| Boundary {
@@ -141,7 +140,7 @@ fn of_segments_is_that_of_clipping_to_slabs() {
                 FreeFlight::Passed(_) => assert!(depth >= tau, "{i}: passed {depth} of {tau}, {segment:?}"),
             }
             if let Some(medium) = start
-                && let Some(flight) = media.short_flight(&segment, medium, depth)
+                && let Some(flight) = media.short_flight(&segment, medium, depth).collision()
             {
                 let FreeFlight::Collision { t, medium: there, .. } =
                     media.free_flight(&segment, &media.regions_at(segment.p), depth)

@@ -4,7 +4,9 @@ use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
 use vdf::{
     geometry::{Segment, Triangle},
     render::{FreeFlight, Integrator, Media, PhaseFunction as _, RegionSet, Sampler},
-    scene::{Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Projection, Rgb, Scene, Surface},
+    scene::{
+        Albedo, Boundary, Bsdf, Emitter, IntegratorSettings, Medium, MediumId, Phase, Projection, Rgb, Scene, Surface,
+    },
 };
 
 use crate::{
@@ -16,7 +18,8 @@ use crate::{
 fn airlight(scene: &Scene, z: (f64, f64)) -> f64 {
     let media = Media::of_scene(scene);
     let Emitter::Point { position, intensity } = scene.emitters[0].clone() else { panic!("a point light") };
-    let Medium { sigma_t, albedo, phase } = scene.media[0];
+    let Medium { sigma_t, albedo, phase } = scene.media[0].clone();
+    let (Some(sigma_t), Albedo::Constant(albedo)) = (sigma_t.grey(), albedo) else { panic!("plain fog") };
     let outside = Segment::new(dvec3(0.0, 0.0, -99.0), DVec3::ZERO);
     assert_eq!(media.transmittance(&outside, &media.regions_at(outside.p)), 1.0, "the camera is in vacuum");
     let f = |t: f64| {
@@ -104,7 +107,7 @@ fn case_36_the_ends_of_the_unit_interval() {
 fn case_37_extinction_without_limits() {
     let make = |sigma_t: f64, albedo: f32| {
         let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
-        scene.media[0] = Medium { sigma_t, albedo: Rgb::splat(albedo), phase: Phase::HenyeyGreenstein { g: 0.9 } };
+        scene.media[0] = Medium::new(sigma_t, Rgb::splat(albedo), Phase::HenyeyGreenstein { g: 0.9 });
         scene
     };
     let vacuum = BOTH.map(|integrator| {
@@ -138,7 +141,7 @@ fn case_37_extinction_without_limits() {
 /// boundaries that change nothing, and media without extinction among others: transmittance and collisions are those of one piece.
 #[test]
 fn case_38_boundaries_that_change_nothing() {
-    let medium = |sigma_t| Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
+    let medium = |sigma_t: f64| Medium::new(sigma_t, Rgb::ONE, Phase::Isotropic);
     let slab = |x0: f32, x1: f32, m| Boundary {
         triangles: cuboid(vec3(x0, -1.0, -1.0), vec3(x1, 1.0, 1.0)),
         interior: Some(MediumId(m)),
@@ -196,7 +199,7 @@ fn case_40_channels_that_are_zero() {
     let colours = [Rgb::new(0.9, 0.0, 0.4), Rgb::new(0.0, 0.0, 0.7), Rgb::new(1.0, 0.5, 0.0)];
     let make = |[albedo, reflectance, intensity]: [Rgb; 3]| {
         let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
-        scene.media[0].albedo = albedo;
+        scene.media[0].albedo = albedo.into();
         scene.surfaces.iter_mut().for_each(|s| s.bsdf = Bsdf::lambertian(reflectance, reflectance));
         scene.emitters = vec![Emitter::Point { position: dvec3(2.0, 6.0, 3.0), intensity }];
         scene.integrator = IntegratorSettings { max_depth: Some(6), rr_depth: 100 };
@@ -251,7 +254,7 @@ fn case_42_a_light_on_the_camera_ray() {
 /// Intervals without length, and those that have lost it: everything between is as if they were not there.
 #[test]
 fn case_43_intervals_without_length() {
-    let medium = |sigma_t| Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
+    let medium = |sigma_t: f64| Medium::new(sigma_t, Rgb::ONE, Phase::Isotropic);
     let closed = |min: Vec3, max: Vec3| Boundary {
         triangles: cuboid(min, max),
         interior: Some(MediumId(0)),
@@ -294,7 +297,7 @@ fn case_43_intervals_without_length() {
         assert_eq!(media.optical_depth(&point, &media.regions_at(point.p)), 0.0);
         assert_eq!(media.transmittance(&point, &media.regions_at(point.p)), 1.0);
         assert_eq!(media.free_flight(&point, &media.regions_at(p), 0.0), FreeFlight::Passed(media.regions_at(p)));
-        assert!(media.short_flight(&point, MediumId(0), 1.0).is_none());
+        assert!(media.short_flight(&point, MediumId(0), 1.0).collision().is_none());
     }
     // Each face twice, and once more the other way round: it winds around the inside as one face does.
     let mut folded = unit;
@@ -359,7 +362,7 @@ fn a_hundred_thousand_bounces() {
     assert!((mean - 1.0).abs() <= 5.0 * error + 6e-3, "{mean} ± {error}");
     // And exactly so many that a limit is met: no path is longer than it says.
     scene.integrator.max_depth = Some(100_000);
-    scene.media[0].sigma_t = 1e5;
+    scene.media[0].sigma_t = 1e5.into();
     let rendering = rendered(
         &scene,
         &Options { spp: Some(1), crop: Some(vdf::scene::PixelRect { x0: 0, y0: 0, x1: 2, y1: 2 }), ..options() },

@@ -20,7 +20,7 @@ fn moved(scene: &Scene, scale: f64, shift: DVec3) -> Scene {
     for t in all.chain(scene.boundaries.iter_mut().map(|b| &mut b.triangles)).flatten() {
         t.vertices = t.vertices.map(|v| map(v.as_dvec3()).as_vec3());
     }
-    scene.media.iter_mut().for_each(|m| m.sigma_t /= scale);
+    scene.media.iter_mut().for_each(|m| m.sigma_t = (m.sigma_t.grey().expect("plain fog") / scale).into());
     for e in &mut scene.emitters {
         if let Emitter::Point { position, intensity } = e {
             *position = map(*position);

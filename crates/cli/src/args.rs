@@ -213,10 +213,11 @@ pub(crate) struct SceneArgs {
 pub(crate) enum SceneCommand {
     /// List the built-in scenes
     List,
-    /// Write a built-in scene and its meshes, to edit it or to load it in Mitsuba 3
+    /// Write a built-in scene with its meshes and volumes, to edit it or to load it in Mitsuba 3
     #[command(after_help = "Examples:
   vdf scene write cbox_vol2 my-scene                      a scene to start from
-  vdf scene write san-miguel court --triangles 10000000   a generated scene in another size (0.7 GB)")]
+  vdf scene write san-miguel court --triangles 10000000   a generated scene in another size (0.7 GB)
+  vdf scene write smoke . --voxels 16777216               a grid of 256 × 256 × 256 (64 MB, half a minute)")]
     Write {
         /// Name of the scene
         name: String,
@@ -226,6 +227,9 @@ pub(crate) enum SceneCommand {
         /// About how many triangles a generated scene gets, from 100000 to 10000000
         #[arg(long, value_name = "N")]
         triangles: Option<u32>,
+        /// About how many voxels a generated volume gets, from 32768 to 100000000
+        #[arg(long, value_name = "N")]
+        voxels: Option<u32>,
     },
 }
 

@@ -15,7 +15,7 @@
 //!     </sensor>
 //!     <emitter type="constant"/>
 //! </scene>"#;
-//! let file = EmbeddedFile { path: "sky.xml".into(), text: text.into() };
+//! let file = EmbeddedFile { path: "sky.xml".into(), bytes: text.as_bytes().into() };
 //! let scene = Scene::from_source(&SceneSource::embedded(file, vec![]), &LoadOptions::default())?;
 //! let prepared = PreparedScene::new(scene, &PrepareOptions::default(), &Quiet)?;
 //! let rendering = prepared.render(&RenderOptions::default(), &Quiet)?;
@@ -61,7 +61,7 @@ pub use filter::{FilterSample, PixelFilter};
 pub use integrator::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};
-pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals, RegionSet};
+pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals, RegionSet, ShortFlight};
 pub use options::{
     Estimator, GridExtent, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator, check_voxel_size,
 };

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec3, Vec2, dvec3, vec2};
 use vdf_geometry::{Bounds, Bvh, CurvedKind, CurvedShape, Hit, Segment, Triangle};
-use vdf_scene::{Bsdf, Emitter, MeshAttributes, Rgb, Scene, TexturePoint};
+use vdf_scene::{Bsdf, Emitter, Extinction, Medium, MeshAttributes, Rgb, Scene, TexturePoint};
 use vdf_visibility::LightShape;
 
 use crate::{
@@ -170,10 +170,12 @@ impl World {
         let curved = others.as_ref().map_or(Bounds::EMPTY, |o| o.bounds());
         let shapes = spheres.fold(bvh.bounds().union(boundaries).union(curved), Bounds::union);
         // No ray has to come near an emitter that is a point, so that a sun far away takes nobody's precision.
+        let media = Media::of_scene(scene);
+        let shapes = shapes.union(media.ambient_bounds());
         let matter = scene.sensor.origins().into_iter().fold(shapes, Bounds::with);
         let bounds = positions(scene).fold(matter, Bounds::with);
         Self {
-            media: Media::of_scene(scene),
+            media,
             lights: Lights::new(scene, reach(scene, matter.extent().length(), bounds.extent().length())),
             far_plane_clips: scene.sensor.far_clip < matter.extent().length(),
             occluder_bounds: occluder_bounds(scene, &bvh, bounds),
@@ -421,6 +423,13 @@ pub fn light_shapes(scene: &Scene) -> Vec<LightShape<'_>> {
 /// `matter` is the diagonal of what rays can meet, `all` that of the scene with its lights.
 fn reach(scene: &Scene, matter: f64, all: f64) -> f64 {
     let (matter, all) = (matter.max(f64::MIN_POSITIVE), all.max(f64::MIN_POSITIVE));
-    let thinnest = scene.media.iter().map(|m| m.sigma_t).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min);
+    // A grid has an end.
+    let least = |m: &Medium| match m.sigma_t {
+        Extinction::Constant(sigma_t) => {
+            sigma_t.to_array().into_iter().filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min)
+        }
+        Extinction::Grid { .. } => f64::INFINITY,
+    };
+    let thinnest = scene.media.iter().map(least).fold(f64::INFINITY, f64::min);
     (800.0 / thinnest).clamp(2.0 * matter, 1e6 * all)
 }

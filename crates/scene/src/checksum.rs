@@ -4,9 +4,9 @@ use glam::DVec3;
 use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
 
 use crate::{
-    Attribute, Boundary, Bsdf, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes,
-    Microfacets, Perturbation, Phase, PixelRect, Pixels, Projection, ReconstructionFilter, Rgb, Roughness, Scene,
-    Sensor, Slide, Surface, Texture, TextureFilter, UvTransform, Wrap,
+    Albedo, Attribute, Boundary, Bsdf, Emitter, Extinction, FilmSettings, GridVolume, IntegratorSettings, Lens, Medium,
+    MediumId, MeshAttributes, Microfacets, Perturbation, Phase, PixelRect, Pixels, Projection, ReconstructionFilter,
+    Rgb, Roughness, Scene, Sensor, Slide, Surface, Texture, TextureFilter, UvTransform, VolumeFilter, Wrap,
 };
 
 impl Scene {
@@ -209,12 +209,7 @@ impl Sum {
                     TextureFilter::Bilinear => 0,
                     TextureFilter::Nearest => 1,
                 };
-                let wrap = match wrap {
-                    Wrap::Repeat => 0,
-                    Wrap::Mirror => 1,
-                    Wrap::Clamp => 2,
-                };
-                self.words(&[2, filter, wrap]);
+                self.words(&[2, filter, wrap_number(*wrap)]);
                 self.pixels(image);
                 self.uv_transform(to_uv);
             }
@@ -250,14 +245,45 @@ impl Sum {
     }
 
     fn medium(&mut self, Medium { sigma_t, albedo, phase }: &Medium) {
-        self.doubles(&[*sigma_t]);
-        self.colour(*albedo);
+        // What a grey medium that is the same everywhere is, it always was; no other begins with a negative extinction.
+        match (sigma_t.grey(), sigma_t) {
+            (Some(grey), _) => self.doubles(&[grey]),
+            (None, Extinction::Constant(sigma_t)) => {
+                self.doubles(&[-1.0]);
+                self.point(*sigma_t);
+            }
+            (None, Extinction::Grid { volume, scale }) => {
+                self.doubles(&[-2.0, *scale]);
+                self.volume(volume);
+            }
+        }
+        match albedo {
+            Albedo::Constant(albedo) => self.colour(*albedo),
+            Albedo::Grid(volume) => {
+                self.colour(-Rgb::ONE);
+                self.volume(volume);
+            }
+        }
         match *phase {
             Phase::Isotropic => self.words(&[0]),
             Phase::HenyeyGreenstein { g } => {
                 self.words(&[1]);
                 self.doubles(&[g]);
             }
+        }
+    }
+
+    fn volume(&mut self, GridVolume { grid, filter, wrap, grid_from_world }: &GridVolume) {
+        let filter = match filter {
+            VolumeFilter::Trilinear => 0,
+            VolumeFilter::Nearest => 1,
+        };
+        self.words(&grid.size());
+        self.words(&[grid.channels() as u32, filter, wrap_number(*wrap)]);
+        self.doubles(&grid_from_world.to_cols_array());
+        for values in grid.values().chunks(1 << 10) {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_bits().to_le_bytes()).collect();
+            self.0.update(&bytes);
         }
     }
 
@@ -348,5 +374,13 @@ impl Sum {
             ReconstructionFilter::CatmullRom => self.words(&[4]),
             ReconstructionFilter::Lanczos { lobes } => self.words(&[5, lobes]),
         }
+    }
+}
+
+const fn wrap_number(wrap: Wrap) -> u32 {
+    match wrap {
+        Wrap::Repeat => 0,
+        Wrap::Mirror => 1,
+        Wrap::Clamp => 2,
     }
 }

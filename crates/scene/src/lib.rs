@@ -13,7 +13,7 @@
 //!     <shape type="cube"><bsdf type="diffuse"/></shape>
 //!     <emitter type="constant"/>
 //! </scene>"#;
-//! let file = EmbeddedFile { path: "cube.xml".into(), text: text.into() };
+//! let file = EmbeddedFile { path: "cube.xml".into(), bytes: text.as_bytes().into() };
 //! let scene = Scene::from_source(&SceneSource::embedded(file, vec![]), &LoadOptions::default())?;
 //! assert_eq!(scene.surfaces[0].triangles.len(), 12);
 //! # Ok(())
@@ -36,16 +36,19 @@ mod serialized;
 mod source;
 mod text;
 mod texture;
+mod vol;
+mod volume;
 
 pub use bsdf::{Bsdf, Microfacets, Perturbation, Principled, PrincipledThin, Roughness};
 pub use error::SceneError;
 pub use load::LoadOptions;
 pub use model::{
-    Boundary, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, Lens, Medium, MediumId, MeshAttributes,
-    Phase, PixelRect, Projection, ReconstructionFilter, Scene, Sensor, Slide, Surface,
+    Albedo, Boundary, ComponentFormat, Emitter, Extinction, FilmSettings, IntegratorSettings, Lens, Medium, MediumId,
+    MeshAttributes, Phase, PixelRect, Projection, ReconstructionFilter, Scene, Sensor, Slide, Surface,
 };
 pub use source::{EmbeddedFile, SceneSource};
 pub use texture::{Attribute, Pixels, Texture, TextureFilter, TexturePoint, UvTransform, Wrap, luminance};
+pub use volume::{GridVolume, VolumeFilter, VoxelGrid};
 
 /// Linear RGB with the primaries of sRGB, as radiance, intensity, reflectance or albedo.
 pub type Rgb = glam::Vec3;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use vdf_geometry::{CurvedShape, Triangle};
 
-use crate::{Bsdf, Pixels, Rgb, Texture};
+use crate::{Bsdf, GridVolume, Pixels, Rgb, Texture};
 
 /// Index into [`Scene::media`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,15 +74,70 @@ pub struct Boundary {
     pub exterior: Option<MediumId>,
 }
 
-/// A homogeneous participating medium.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A participating medium.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Medium {
-    /// Extinction coefficient in 1/world unit, including the file's `scale`; finite and at least 0.
-    pub sigma_t: f64,
-    /// Single-scattering albedo σ_s/σ_t, each channel in [0, 1].
-    pub albedo: Rgb,
+    /// Extinction coefficient in 1/world unit, including the file's `scale`.
+    pub sigma_t: Extinction,
+    /// Single-scattering albedo σ_s/σ_t.
+    pub albedo: Albedo,
     /// Phase function.
     pub phase: Phase,
+}
+
+/// What a medium takes away, in 1/world unit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Extinction {
+    /// The same everywhere, for red, green and blue; finite and at least 0.
+    Constant(DVec3),
+    /// What a grid says in its box ([`GridVolume::world_bounds`]), and nothing outside of it.
+    Grid {
+        /// The grid.
+        volume: GridVolume,
+        /// What its values are multiplied with; finite and at least 0, and so is the product.
+        scale: f64,
+    },
+}
+
+/// Single-scattering albedo σ_s/σ_t, each channel in [0, 1].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Albedo {
+    /// The same everywhere.
+    Constant(Rgb),
+    /// What a grid says, also outside of its box.
+    Grid(GridVolume),
+}
+
+impl Medium {
+    /// A medium; `sigma_t` may be one number, for grey fog, and `albedo` a colour.
+    #[must_use]
+    pub fn new(sigma_t: impl Into<Extinction>, albedo: impl Into<Albedo>, phase: Phase) -> Self {
+        Self { sigma_t: sigma_t.into(), albedo: albedo.into(), phase }
+    }
+}
+
+impl From<f64> for Extinction {
+    /// A grey one.
+    fn from(sigma_t: f64) -> Self {
+        Self::Constant(DVec3::splat(sigma_t))
+    }
+}
+
+impl From<Rgb> for Albedo {
+    fn from(albedo: Rgb) -> Self {
+        Self::Constant(albedo)
+    }
+}
+
+impl Extinction {
+    /// The extinction, if it is the same everywhere and for all colours.
+    #[must_use]
+    pub fn grey(&self) -> Option<f64> {
+        match self {
+            Self::Constant(sigma_t) if sigma_t.x == sigma_t.y && sigma_t.y == sigma_t.z => Some(sigma_t.x),
+            _ => None,
+        }
+    }
 }
 
 /// A phase function.

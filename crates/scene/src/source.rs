@@ -11,7 +11,7 @@ pub struct EmbeddedFile {
     /// Path relative to the scene's folder, with `/` between its parts.
     pub path: Cow<'static, str>,
     /// The contents.
-    pub text: Cow<'static, str>,
+    pub bytes: Cow<'static, [u8]>,
 }
 
 /// A scene that can be loaded.
@@ -85,7 +85,7 @@ impl SceneSource {
             let file = self
                 .find(path)
                 .ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "no such file in the embedded scene"))?;
-            let bytes = file.text.as_bytes();
+            let bytes = &*file.bytes;
             let size = bytes.len() as u64;
             return if size > most { Err(too_large(size)) } else { Ok((Box::new(bytes), size)) };
         }

@@ -82,7 +82,7 @@ pub enum TextureFilter {
     Nearest,
 }
 
-/// What is outside of the unit square.
+/// What is outside of the unit square, or the unit cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
     /// The same again.
@@ -232,7 +232,8 @@ pub fn luminance(colour: Rgb) -> f32 {
 impl Wrap {
     /// The pixel of a row of n that stands for pixel i of an endless one.
     #[inline]
-    fn pixel(self, i: i64, n: i64) -> i64 {
+    #[must_use]
+    pub fn pixel(self, i: i64, n: i64) -> i64 {
         match self {
             Self::Clamp => i.clamp(0, n - 1),
             Self::Repeat => i.rem_euclid(n),

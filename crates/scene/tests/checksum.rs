@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Vec3};
 use vdf_scene::{
-    Attribute, Bsdf, Emitter, Lens, LoadOptions, MeshAttributes, Perturbation, Phase, Pixels, Projection,
-    ReconstructionFilter, Rgb, Scene, Slide, Texture,
+    Albedo, Attribute, Bsdf, Emitter, Extinction, GridVolume, Lens, LoadOptions, MeshAttributes, Perturbation, Phase,
+    Pixels, Projection, ReconstructionFilter, Rgb, Scene, Slide, Texture, VolumeFilter, VoxelGrid, Wrap,
 };
 use vdf_scenes::builtin;
 
@@ -26,6 +26,11 @@ fn projector(scale: f32) -> Emitter {
     Emitter::Projector { position: DVec3::ZERO, direction: DVec3::Z, slide }
 }
 
+fn grid(value: f32, wrap: Wrap) -> GridVolume {
+    let grid = VoxelGrid::new([2, 1, 1], 1, vec![1.0, value], [Vec3::ZERO, Vec3::ONE]).expect("a grid");
+    GridVolume { grid: Arc::new(grid), filter: VolumeFilter::Trilinear, wrap, grid_from_world: DMat4::IDENTITY }
+}
+
 #[test]
 fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
     let scene = loaded("cbox_vol3", &[]);
@@ -36,7 +41,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         change(&mut changed);
         assert_eq!(changed.checksum(), scene.checksum());
     }
-    let other: [fn(&mut Scene); 34] = [
+    let other: [fn(&mut Scene); 40] = [
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
@@ -46,7 +51,13 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| drop(s.surfaces.pop()),
         |s| s.boundaries[0].interior = None,
         |s| s.boundaries[0].exterior = s.boundaries[0].interior,
-        |s| s.media[0].sigma_t *= 1.5,
+        |s| s.media[0].sigma_t = 1.5.into(),
+        |s| s.media[0].sigma_t = Extinction::Constant(glam::dvec3(1.5, 1.5, 1.0)),
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(1.0, Wrap::Clamp), scale: 1.0 },
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(1.0, Wrap::Clamp), scale: 2.0 },
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(0.5, Wrap::Clamp), scale: 1.0 },
+        |s| s.media[0].sigma_t = Extinction::Grid { volume: grid(1.0, Wrap::Repeat), scale: 1.0 },
+        |s| s.media[0].albedo = Albedo::Grid(grid(1.0, Wrap::Clamp)),
         |s| s.media[0].phase = Phase::HenyeyGreenstein { g: 0.0 },
         |s| s.emitters.reverse(),
         |s| s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens: None },

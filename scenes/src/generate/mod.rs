@@ -1,6 +1,6 @@
 //! Scenes that are computed instead of stored: as large as one likes, and the same bytes on every platform.
 //!
-//! A mesh is a function that passes its triangles to a [`MeshSink`] as it makes them, so that writing it takes no more memory for ten million
+//! A volume is a function that writes its values in order, a mesh is a function that passes its triangles to a [`MeshSink`] as it makes them, so that writing it takes no more memory for ten million
 //! triangles than for a hundred thousand. Numbers come from [`random`], which is exact on every platform.
 
 mod court;
@@ -8,6 +8,7 @@ mod landscape;
 mod mesh;
 mod random;
 mod shapes;
+mod smoke;
 #[cfg(test)]
 mod tests;
 
@@ -20,23 +21,37 @@ use crate::ScenesError;
 /// Passes the triangles of one mesh of a scene of about so many triangles.
 type MeshFunction = fn(u32, &mut dyn MeshSink) -> io::Result<()>;
 
+/// Writes a volume of about so many voxels.
+type VolumeFunction = fn(u32, &mut dyn Write) -> io::Result<()>;
+
+/// How large a scene is, and what is counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// Triangles of its meshes.
+    Triangles(u32),
+    /// Voxels of its volumes.
+    Voxels(u32),
+}
+
 /// A kind of scene.
 struct Recipe {
     name: &'static str,
-    default_triangles: u32,
+    default_size: Size,
     /// Path and text of the scene file.
     scene: (&'static str, &'static str),
     /// Paths of the meshes and what is in them.
     meshes: &'static [(&'static str, MeshFunction)],
+    /// Paths of the volumes and what is in them.
+    volumes: &'static [(&'static str, VolumeFunction)],
 }
 
-static RECIPES: [&Recipe; 2] = [&court::RECIPE, &landscape::RECIPE];
+static RECIPES: [&Recipe; 3] = [&court::RECIPE, &landscape::RECIPE, &smoke::RECIPE];
 
 /// A generated scene of a certain size.
 #[derive(Clone, Copy)]
 pub struct GeneratedScene {
     recipe: &'static Recipe,
-    triangles: u32,
+    size: Size,
 }
 
 /// One file of a generated scene.
@@ -51,13 +66,14 @@ pub struct GeneratedFile {
 enum Content {
     Text(&'static str),
     Mesh(MeshFunction, u32),
+    Volume(VolumeFunction, u32),
 }
 
 /// The generated scene of that name, of its default size.
 #[must_use]
 pub fn generated(name: &str) -> Option<GeneratedScene> {
     let recipe = RECIPES.into_iter().find(|r| r.name == name)?;
-    Some(GeneratedScene { recipe, triangles: recipe.default_triangles })
+    Some(GeneratedScene { recipe, size: recipe.default_size })
 }
 
 impl GeneratedScene {
@@ -65,32 +81,62 @@ impl GeneratedScene {
     pub const MIN_TRIANGLES: u32 = 100_000;
     /// The most triangles that a generated scene can have.
     pub const MAX_TRIANGLES: u32 = 10_000_000;
+    /// The fewest voxels that a generated volume can have.
+    pub const MIN_VOXELS: u32 = 32_768;
+    /// The most voxels that a generated volume can have.
+    pub const MAX_VOXELS: u32 = 100_000_000;
 
     /// The scene with about so many triangles (within 0.5 %).
     ///
     /// # Errors
-    /// If they are fewer than [`Self::MIN_TRIANGLES`] or more than [`Self::MAX_TRIANGLES`].
+    /// If they are fewer than [`Self::MIN_TRIANGLES`] or more than [`Self::MAX_TRIANGLES`], or the scene is one of voxels.
     pub fn with_triangles(self, triangles: u32) -> Result<Self, ScenesError> {
         let (min, max) = (Self::MIN_TRIANGLES, Self::MAX_TRIANGLES);
         if !(min..=max).contains(&triangles) {
             return Err(ScenesError::Triangles { min, max, found: triangles });
         }
-        Ok(Self { triangles, ..self })
+        match self.size {
+            Size::Triangles(_) => Ok(Self { size: Size::Triangles(triangles), ..self }),
+            Size::Voxels(_) => {
+                Err(ScenesError::Measure { name: self.recipe.name, measure: "voxels", other: "triangles" })
+            }
+        }
     }
 
-    /// About how many triangles the scene has.
+    /// The scene with about so many voxels: the largest cube that does not have more.
+    ///
+    /// # Errors
+    /// If they are fewer than [`Self::MIN_VOXELS`] or more than [`Self::MAX_VOXELS`], or the scene is one of triangles.
+    pub fn with_voxels(self, voxels: u32) -> Result<Self, ScenesError> {
+        let (min, max) = (Self::MIN_VOXELS, Self::MAX_VOXELS);
+        if !(min..=max).contains(&voxels) {
+            return Err(ScenesError::Voxels { min, max, found: voxels });
+        }
+        match self.size {
+            Size::Voxels(_) => Ok(Self { size: Size::Voxels(voxels), ..self }),
+            Size::Triangles(_) => {
+                Err(ScenesError::Measure { name: self.recipe.name, measure: "triangles", other: "voxels" })
+            }
+        }
+    }
+
+    /// About how large the scene is.
     #[must_use]
-    pub const fn triangles(&self) -> u32 {
-        self.triangles
+    pub const fn size(&self) -> Size {
+        self.size
     }
 
     /// The files, the scene file first. Written to a folder under their paths they are the scene.
     pub fn files(&self) -> impl Iterator<Item = GeneratedFile> + use<> {
-        let Self { recipe, triangles } = *self;
+        let Self { recipe, size } = *self;
+        let (Size::Triangles(size) | Size::Voxels(size)) = size;
         let (path, text) = recipe.scene;
-        let meshes = recipe.meshes.iter();
-        std::iter::once(GeneratedFile { path, content: Content::Text(text) })
-            .chain(meshes.map(move |&(path, mesh)| GeneratedFile { path, content: Content::Mesh(mesh, triangles) }))
+        let meshes = recipe.meshes.iter().map(move |&(path, mesh)| (path, Content::Mesh(mesh, size)));
+        let volumes = recipe.volumes.iter().map(move |&(path, volume)| (path, Content::Volume(volume, size)));
+        std::iter::once((path, Content::Text(text)))
+            .chain(meshes)
+            .chain(volumes)
+            .map(|(path, content)| GeneratedFile { path, content })
     }
 }
 
@@ -103,13 +149,14 @@ impl GeneratedFile {
         match self.content {
             Content::Text(text) => out.write_all(text.as_bytes()),
             Content::Mesh(mesh, triangles) => mesh(triangles, &mut ObjWriter::new(out)),
+            Content::Volume(volume, voxels) => volume(voxels, out),
         }
     }
 }
 
 impl std::fmt::Debug for GeneratedScene {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("GeneratedScene").field("name", &self.recipe.name).field("triangles", &self.triangles).finish()
+        f.debug_struct("GeneratedScene").field("name", &self.recipe.name).field("size", &self.size).finish()
     }
 }
 

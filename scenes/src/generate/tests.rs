@@ -41,8 +41,12 @@ fn scene(name: &str, defines: &[(&str, &str)]) -> Scene {
 /// The same bytes on every platform. Whoever changes a scene on purpose changes these numbers.
 #[test]
 fn the_bytes_are_always_the_same() {
-    for (name, expected) in [("san-miguel", 0x293d_e416_45ec_9865), ("scape", 0x0854_a97c_83e1_c71a)] {
-        let smallest = generated(name).unwrap().with_triangles(GeneratedScene::MIN_TRIANGLES).unwrap();
+    for (name, expected) in [("san-miguel", 0x293d_e416_45ec_9865), ("scape", 0x0854_a97c_83e1_c71a), ("smoke", 0)] {
+        let scene = generated(name).unwrap();
+        let smallest = match scene.size() {
+            Size::Triangles(_) => scene.with_triangles(GeneratedScene::MIN_TRIANGLES).unwrap(),
+            Size::Voxels(_) => scene.with_voxels(GeneratedScene::MIN_VOXELS).unwrap(),
+        };
         let sum = checksum(smallest);
         assert_eq!(sum, expected, "{name}: {sum:#018x}");
         assert_ne!(sum, checksum(generated(name).unwrap()));
@@ -52,7 +56,8 @@ fn the_bytes_are_always_the_same() {
 #[test]
 fn the_number_of_triangles_is_met() {
     for recipe in RECIPES {
-        for triangles in [100_000, 123_457, recipe.default_triangles, 1_000_000, 3_000_000] {
+        let Size::Triangles(default) = recipe.default_size else { continue };
+        for triangles in [100_000, 123_457, default, 1_000_000, 3_000_000] {
             let counts: Vec<_> = recipe.meshes.iter().map(|(_, mesh)| count(&[*mesh], triangles).unwrap()).collect();
             let made: u32 = counts.iter().sum();
             assert!(made.abs_diff(triangles) <= triangles / 200, "{}: {made} of {triangles}", recipe.name);
@@ -68,13 +73,21 @@ fn sizes_out_of_range_are_refused() {
         let error = scene.with_triangles(n).unwrap_err().to_string();
         assert!(error.contains("triangles must be from 100000 to 10000000"), "{error}");
     }
-    assert_eq!(scene.with_triangles(GeneratedScene::MAX_TRIANGLES).unwrap().triangles(), 10_000_000);
+    let most = scene.with_triangles(GeneratedScene::MAX_TRIANGLES).unwrap();
+    assert_eq!(most.size(), Size::Triangles(10_000_000));
+    assert!(scene.with_voxels(1 << 20).unwrap_err().to_string().contains("write --triangles"));
+    let smoke = generated("smoke").unwrap();
+    assert!(smoke.with_triangles(1 << 20).unwrap_err().to_string().contains("write --voxels"));
+    for n in [0, GeneratedScene::MIN_VOXELS - 1, GeneratedScene::MAX_VOXELS + 1] {
+        assert!(smoke.with_voxels(n).unwrap_err().to_string().contains("voxels must be from 32768 to 100000000"));
+    }
+    assert_eq!(smoke.with_voxels(1 << 20).unwrap().size(), Size::Voxels(1 << 20));
     assert!(generated("cbox_vol2").is_none());
 }
 
 #[test]
 fn geometry_is_inside_the_fog_and_has_area() {
-    for recipe in RECIPES {
+    for recipe in RECIPES.into_iter().filter(|recipe| recipe.volumes.is_empty()) {
         let scene = scene(recipe.name, &[]);
         let fog = Bounds::of_triangles(&scene.boundaries[0].triangles);
         for surface in &scene.surfaces {
@@ -87,4 +100,18 @@ fn geometry_is_inside_the_fog_and_has_area() {
         assert_eq!(scene.boundaries.len(), 1);
         assert_eq!(scene.emitters.len(), 1);
     }
+}
+
+/// The volume that is written is the one that is loaded, in its box.
+#[test]
+fn smoke_is_a_grid_in_its_box() {
+    let smoke = scene("smoke", &[]);
+    assert_eq!(smoke.warnings, Vec::<String>::new());
+    let vdf_scene::Extinction::Grid { volume, scale } = &smoke.media[0].sigma_t else { panic!("no grid") };
+    assert_eq!((volume.grid.size(), *scale), ([96; 3], 20.0));
+    let fog = Bounds::of_triangles(&smoke.boundaries[0].triangles);
+    let bounds = volume.world_bounds();
+    assert!((bounds.min - fog.min).abs().max_element() < 1e-12 && (bounds.max - fog.max).abs().max_element() < 1e-12);
+    // Dense in the middle, nothing at the corner.
+    assert!(volume.grid.max() > 0.6 && volume.at(fog.min).x == 0.0);
 }

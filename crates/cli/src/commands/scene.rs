@@ -8,16 +8,17 @@ use std::{
 use anyhow::{Context as _, anyhow};
 use vdf_image::{shown, write_atomically};
 use vdf_scene::EmbeddedFile;
-use vdf_scenes::{GeneratedFile, builtin, builtin_names, generated};
+use vdf_scenes::{GeneratedFile, Size, builtin, builtin_names, generated};
 
 use crate::{args::SceneCommand, failure::Failure, progress::Reporter};
 
 pub(crate) fn run(command: &SceneCommand) -> Result<(), Failure> {
     match command {
         SceneCommand::List => list(),
-        SceneCommand::Write { name, folder, triangles } => match generated(name) {
+        SceneCommand::Write { name, folder, triangles, voxels } => match generated(name) {
             Some(scene) => {
                 let scene = triangles.map_or(Ok(scene), |n| scene.with_triangles(n))?;
+                let scene = voxels.map_or(Ok(scene), |n| scene.with_voxels(n))?;
                 write(scene.files().map(SceneFile::Generated), folder)
             }
             None => {
@@ -25,8 +26,9 @@ pub(crate) fn run(command: &SceneCommand) -> Result<(), Failure> {
                 let source = builtin(name).ok_or_else(|| {
                     Failure::Usage(anyhow!("no built-in scene is called '{name}'; there are {names}"))
                 })?;
-                if triangles.is_some() {
-                    let message = anyhow!("--triangles is for generated scenes; {name} always has the same triangles");
+                if triangles.is_some() || voxels.is_some() {
+                    let option = if triangles.is_some() { "triangles" } else { "voxels" };
+                    let message = anyhow!("--{option} is for generated scenes; {name} always has the same {option}");
                     return Err(Failure::Usage(message));
                 }
                 write(source.files().iter().map(SceneFile::Embedded), folder)
@@ -40,7 +42,13 @@ fn list() -> Result<(), Failure> {
     let stdout = &mut io::stdout();
     for name in builtin_names() {
         match generated(name) {
-            Some(scene) => writeln!(stdout, "{name:<12}generated, {} triangles by default", scene.triangles())?,
+            Some(scene) => {
+                let size = match scene.size() {
+                    Size::Triangles(n) => format!("{n} triangles"),
+                    Size::Voxels(n) => format!("{n} voxels"),
+                };
+                writeln!(stdout, "{name:<12}generated, {size} by default")?;
+            }
             None => writeln!(stdout, "{name}")?,
         }
     }
@@ -62,7 +70,7 @@ impl SceneFile<'_> {
 
     fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         match self {
-            Self::Embedded(file) => out.write_all(file.text.as_bytes()),
+            Self::Embedded(file) => out.write_all(&file.bytes),
             Self::Generated(file) => file.write(out),
         }
     }

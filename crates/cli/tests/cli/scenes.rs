@@ -9,6 +9,7 @@ fn list() {
     let sandbox = Sandbox::new();
     let names = sandbox.run(&["scene", "list"]).succeeded().stdout;
     assert!(names.contains("\nscape       generated, 130000 triangles by default\n"), "{names}");
+    assert!(names.contains("\nsmoke       generated, 884736 voxels by default\n"), "{names}");
     let names: Vec<_> = names.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert!(["cbox_vol2", "cbox_vol4", "san-miguel"].iter().all(|name| names.contains(name)), "{names:?}");
     for name in names {
@@ -62,7 +63,7 @@ fn generated_scene_renders_the_same_from_disk() {
 }
 
 #[test]
-fn number_of_triangles() {
+fn sizes_of_generated_scenes() {
     let sandbox = Sandbox::new();
     for n in ["0", "1", "99999", "10000001", "4294967295"] {
         let message = format!("--triangles must be from 100000 to 10000000, not {n}");
@@ -71,6 +72,10 @@ fn number_of_triangles() {
     for n in ["-1", "many", "4294967296", "1e6"] {
         sandbox.fails(&["scene", "write", "san-miguel", &format!("--triangles={n}")], 2, &["--triangles", n]);
     }
+    let message = "--voxels must be from 32768 to 100000000, not 1000";
+    sandbox.fails(&["scene", "write", "smoke", "--voxels", "1000"], 2, &[message]);
+    let message = "triangles is not the size of smoke: write --voxels";
+    sandbox.fails(&["scene", "write", "smoke", "--triangles", "100000"], 2, &[message]);
     let message = "--triangles is for generated scenes; cbox_vol2 always has the same triangles";
     sandbox.fails(&["scene", "write", "cbox_vol2", "--triangles", "100000"], 2, &[message]);
 }

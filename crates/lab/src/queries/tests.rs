@@ -252,7 +252,7 @@ pub(crate) fn lamp() -> Scene {
             <bsdf type="diffuse"/>
         </shape>
     </scene>"#;
-    let file = vdf_scene::EmbeddedFile { path: "lamp.xml".into(), text: text.into() };
+    let file = vdf_scene::EmbeddedFile { path: "lamp.xml".into(), bytes: text.as_bytes().to_vec().into() };
     let source = vdf_scene::SceneSource::embedded(file, vec![]);
     Scene::from_source(&source, &LoadOptions::default()).unwrap()
 }

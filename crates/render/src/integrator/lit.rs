@@ -96,10 +96,10 @@ impl<R: Recorder> Tracer<'_, R> {
                 known = Some((choice.emitter, self.lit(fog, stretches, &choice.place, counters)));
             }
             let Some((_, lit)) = &known else { break };
-            let Some((i, distance)) = lit.sample(u) else { continue };
+            let Some((i, distance)) = lit.sample(u, fog) else { continue };
             let piece = &lit.pieces[i];
             let stretch = &lit.stretches[i];
-            let arrives = stretch.sigma_t * (-stretch.depth_at(distance)).exp();
+            let arrives = stretch.arrives(distance, fog.intervals);
             let pdf = lit.pdf(i, distance, arrives) * choice.probability;
             if !(arrives > 0.0 && pdf > 0.0) {
                 continue;
@@ -111,7 +111,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let Some(light) = place.and_then(|place| lights.seen_from(point, &place)) else { continue };
             let vertex = Vertex::InMedium { phase: stretch.phase, direction: fog.direction };
             let (value, _) = vertex.eval(self.world, light.direction);
-            let value = value * light.weight * stretch.albedo;
+            let value = value * light.weight * stretch.albedo_at(point, fog.intervals);
             if value.max_element() <= 0.0 {
                 continue;
             }
@@ -186,15 +186,14 @@ impl<R: Recorder> Tracer<'_, R> {
         let mut pieces: SmallVec<[Piece; 4]> = SmallVec::new();
         let mut cut: SmallVec<[Stretch; 4]> = SmallVec::new();
         for stretch in stretches {
-            let part = fog.intervals.part(stretch.part);
             for [begin, end] in intervals.open() {
-                let ends = [begin.max(part.t0), end.min(part.t1)];
+                let ends = [begin.max(stretch.ends[0]), end.min(stretch.ends[1])];
                 if ends[0] >= ends[1] {
                     continue;
                 }
                 let [begin, end] = [ends[0] * length, ends[1] * length];
-                let of_piece = Stretch { begin, end, depth: stretch.depth_at(begin), ..*stretch };
-                let through = -(stretch.sigma_t * (begin - end)).exp_m1();
+                let Some(of_piece) = stretch.cut(begin, end, fog.intervals) else { continue };
+                let through = -(of_piece.sigma_t * (begin - end)).exp_m1();
                 pieces.push(Piece { ends, mass: (-of_piece.depth).exp() * through });
                 cut.push(of_piece);
             }
@@ -215,7 +214,7 @@ impl<R: Recorder> Tracer<'_, R> {
 impl Lit {
     /// A distance, and the index of its piece, from a uniform number; `None` if nothing can be drawn.
     #[inline]
-    fn sample(&self, u: f64) -> Option<(usize, f64)> {
+    fn sample(&self, u: f64, fog: &Fog<'_>) -> Option<(usize, f64)> {
         if u < self.share {
             return self.towards.sample(u / self.share);
         }
@@ -225,8 +224,7 @@ impl Lit {
             if left < piece.mass || i == last {
                 let through = -(stretch.sigma_t * (stretch.begin - stretch.end)).exp_m1();
                 let share = (left / piece.mass).clamp(0.0, 1.0);
-                let distance = stretch.begin - (-share * through).ln_1p() / stretch.sigma_t;
-                return Some((i, distance.min(stretch.end)));
+                return Some((i, stretch.distance_of(-(-share * through).ln_1p(), fog.intervals)));
             }
             left -= piece.mass;
         }

@@ -84,15 +84,15 @@ impl<R: Recorder> Tracer<'_, R> {
                     if !self.may_scatter(path.depth) {
                         break;
                     }
-                    let m = media.medium(medium);
-                    path.throughput *= m.albedo;
-                    let vertex = Vertex::InMedium { phase: m.phase, direction };
+                    let (albedo, phase) = media.scattering(medium, point);
+                    path.throughput *= albedo;
+                    let vertex = Vertex::InMedium { phase, direction };
                     let mixture = self.mixture(point, &vertex, mean_free_path, sampler.next_1d());
                     path.radiance += path.throughput
                         * self.light_from(point, &vertex, &regions, place.as_ref(), &mixture, sampler, counters);
                     let u = sampler.next_2d();
-                    let to = mixture.sample(u).unwrap_or_else(|| m.phase.sample_direction(direction, u));
-                    let value = m.phase.pdf_direction(direction, to);
+                    let to = mixture.sample(u).unwrap_or_else(|| phase.sample_direction(direction, u));
+                    let value = phase.pdf_direction(direction, to);
                     let pdf = mixture.pdf(to, value);
                     path.reweight(value / pdf);
                     path.origin = Origin::Scattering { point, pdf };
@@ -156,19 +156,19 @@ impl<R: Recorder> Tracer<'_, R> {
         }
         let stretches = stretches(&intervals, media);
         let towards = Equiangular::<NODES>::new(free.p, path.ray.direction, &stretches, light);
-        let drawn = if u < share { towards.sample(u / share) } else { distance_at_depth(&stretches, depth) };
+        let drawn =
+            if u < share { towards.sample(u / share) } else { distance_at_depth(&stretches, depth, &intervals) };
         // Where no distance can be drawn that share of the rays is worth nothing, and the others are worth as much more.
         let Some((i, distance)) = drawn else {
             path.reweight(0.0);
             return Event::Arrival { surface: None, regions: RegionSet::default() };
         };
         let stretch = &stretches[i];
-        let flight = stretch.sigma_t * (-stretch.depth_at(distance)).exp();
+        let flight = stretch.arrives(distance, &intervals);
         let pdf = share * towards.pdf(i, distance) + (1.0 - share) * flight;
         // Nothing comes from where exp(−τ) underflows.
         path.reweight(if flight > 0.0 { flight / pdf } else { 0.0 });
-        let part = intervals.part(stretch.part);
-        let t = (distance / intervals.length()).clamp(part.t0, part.t1);
+        let t = (distance / intervals.length()).clamp(stretch.ends[0], stretch.ends[1]);
         let regions = intervals.regions_in(stretch.part, t);
         self.crosses_to(path, &regions);
         Event::Collision { point: free.at(t), medium: stretch.medium, regions }

@@ -1,5 +1,6 @@
 //! The integrators, and what they share: next-event estimation and multiple importance sampling.
 
+mod chromatic;
 mod equiangular;
 mod kind;
 mod lit;
@@ -80,6 +81,8 @@ struct Path {
     /// The square of the index of refraction that the path is in, over that where it began: so much less radiance is worth there. Roulette leaves it
     /// alone, or it would kill what goes into glass.
     compression: f32,
+    /// What its free flights are worth in each channel; the mean is 1. All are 1 unless a medium is chromatic.
+    worth: DVec3,
     /// Light gathered so far.
     radiance: Rgb,
 }
@@ -95,6 +98,7 @@ impl Path {
             throughput: Rgb::ONE,
             aim: 1.0,
             compression: 1.0,
+            worth: DVec3::ONE,
             radiance: Rgb::ZERO,
         }
     }
@@ -136,8 +140,10 @@ impl<R: Recorder> Tracer<'_, R> {
     ) -> Rgb {
         match integrator {
             Integrator::Volpath => match self.estimator {
-                Estimator::Thesis => self.volpath(ray, sampler, counters),
-                Estimator::Equiangular | Estimator::Lit => self.volpath_by_mixture(ray, sampler, counters),
+                Estimator::Equiangular | Estimator::Lit if !self.world.media.is_chromatic() => {
+                    self.volpath_by_mixture(ray, sampler, counters)
+                }
+                _ => self.volpath(ray, sampler, counters),
             },
             Integrator::Raymarch(samples) => self.raymarch(ray, samples, sampler, counters),
         }
@@ -347,11 +353,16 @@ impl<R: Recorder> Tracer<'_, R> {
 
     /// The estimate of the transmittance from a point in these regions to an emitter.
     #[inline]
-    fn transmittance_to(&self, point: DVec3, light: &LightSample, regions: &RegionSet, flight: Option<f64>) -> f32 {
-        let tau = self.world.media.optical_depth(&Segment::new(point, light.point), regions);
-        match flight {
+    fn transmittance_to(&self, point: DVec3, light: &LightSample, regions: &RegionSet, flight: Option<f64>) -> Rgb {
+        let (media, segment) = (&self.world.media, Segment::new(point, light.point));
+        let through = |tau: f64| match flight {
             None => to_f32((-tau).exp()),
             Some(flight) => f32::from(flight >= tau),
+        };
+        if media.is_chromatic() {
+            Rgb::from_array(media.optical_depths(&segment, regions).to_array().map(through))
+        } else {
+            Rgb::splat(through(media.optical_depth(&segment, regions)))
         }
     }
 

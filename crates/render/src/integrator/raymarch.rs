@@ -39,7 +39,7 @@ pub(super) struct Fog<'a> {
     pub(super) free: &'a Segment,
     pub(super) direction: DVec3,
     pub(super) intervals: &'a MediumIntervals<'a>,
-    /// The optical depth of all of it, positive.
+    /// The optical depth of all of it, the largest of all colours, positive.
     tau: f64,
     pub(super) samples: u32,
 }
@@ -58,6 +58,22 @@ impl<R: Recorder> Tracer<'_, R> {
         while self.goes_on(&mut path, sampler) {
             let (surface, free) = self.cast(&path.ray, counters);
             let intervals = self.world.media.intervals(&free, &path.ray.regions);
+            if self.world.media.is_chromatic() {
+                let depths = intervals.optical_depths();
+                let tau = depths.max_element();
+                if tau > 0.0 && self.may_scatter(path.depth + 1) {
+                    let samples = samples.of_share(f64::from(path.throughput.max_element()) * -(-tau).exp_m1());
+                    let fog = Fog { free: &free, direction: path.ray.direction, intervals: &intervals, tau, samples };
+                    let light = self.by_transmittances(&fog, depths, sampler, counters);
+                    path.radiance += path.throughput * light;
+                }
+                path.throughput *= (-depths).exp().as_vec3();
+                self.crosses_to(&mut path, intervals.end());
+                if !self.arrive(&mut path, surface, intervals.end().clone(), sampler, counters) {
+                    break;
+                }
+                continue;
+            }
             let tau = intervals.optical_depth();
             if tau > 0.0 && self.may_scatter(path.depth + 1) {
                 let samples = samples.of_share(f64::from(path.throughput.max_element()) * -(-tau).exp_m1());
@@ -108,13 +124,13 @@ impl<R: Recorder> Tracer<'_, R> {
             let depth = stratum_depth(k, width, sampler.next_1d());
             // Rounding may place the last sample an ulp beyond the end; it is worth nothing there.
             if let FreeFlight::Collision { t, medium, regions } = intervals.free_flight(depth) {
-                let m = self.world.media.medium(medium);
-                let vertex = Vertex::InMedium { phase: m.phase, direction };
                 let point = free.at(t);
+                let (albedo, phase) = self.world.media.scattering(medium, point);
+                let vertex = Vertex::InMedium { phase, direction };
                 let (light, flight) = self.draw_emitter(point, sampler);
                 if let Some(light) = light {
                     let at = Aim { point, vertex: &vertex, regions: &regions, light: &light, flight };
-                    self.gather(&mut gathered, &at, |value| m.albedo * value, counters);
+                    self.gather(&mut gathered, &at, |value| albedo * value, counters);
                 }
             }
         }
@@ -158,25 +174,28 @@ impl<R: Recorder> Tracer<'_, R> {
             let share = if towards.is_some() { TOWARDS_LIGHT } else { 0.0 };
             let drawn = match towards {
                 Some(towards) if u < share => towards.sample(u / share),
-                _ => distance_at_depth(stretches, -(-(u - share) / (1.0 - share) * scattered).ln_1p()),
+                _ => {
+                    let depth = -(-(u - share) / (1.0 - share) * scattered).ln_1p();
+                    distance_at_depth(stretches, depth, fog.intervals)
+                }
             };
             let Some((i, distance)) = drawn else { continue };
             let stretch = &stretches[i];
-            let arrives = stretch.sigma_t * (-stretch.depth_at(distance)).exp();
+            let arrives = stretch.arrives(distance, fog.intervals);
             let pdf =
                 share * towards.map_or(0.0, |towards| towards.pdf(i, distance)) + (1.0 - share) * arrives / scattered;
             // Nothing arrives from where exp(−τ) underflows.
             if !(arrives > 0.0 && pdf > 0.0) {
                 continue;
             }
-            let part = fog.intervals.part(stretch.part);
-            let t = (distance / fog.intervals.length()).clamp(part.t0, part.t1);
+            let t = (distance / fog.intervals.length()).clamp(stretch.ends[0], stretch.ends[1]);
             let point = fog.free.at(t);
             if let Some(light) = lights.seen_from(point, &place) {
                 let vertex = Vertex::InMedium { phase: stretch.phase, direction: fog.direction };
                 let regions = fog.intervals.regions_in(stretch.part, t);
+                let albedo = stretch.albedo_at(point, fog.intervals);
                 let at = Aim { point, vertex: &vertex, regions: &regions, light: &light, flight };
-                self.gather(&mut gathered, &at, |value| stretch.albedo * value * to_f32(arrives / pdf), counters);
+                self.gather(&mut gathered, &at, |value| albedo * value * to_f32(arrives / pdf), counters);
             }
         }
         self.ask_all(&mut gathered, counters);

@@ -13,7 +13,11 @@ use vdf_scene::{MediumId, Rgb};
 use vdf_visibility::{Counters, Recorder};
 
 use super::{Origin, Path, PathRay, Tracer, Vertex, sample_free_flight};
-use crate::{PhaseFunction as _, RegionSet, Sampler, media::FreeFlight, world::SurfacePoint};
+use crate::{
+    PhaseFunction as _, RegionSet, Sampler,
+    media::{FreeFlight, ShortFlight},
+    world::SurfacePoint,
+};
 
 /// What a ray comes to.
 pub(super) enum Event {
@@ -28,19 +32,24 @@ impl<R: Recorder> Tracer<'_, R> {
     pub(crate) fn volpath(&self, ray: PathRay, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
-            let tau = sample_free_flight(sampler);
-            match self.first_event(&mut path, tau, counters) {
+            let event = if self.world.media.is_chromatic() {
+                self.chromatic_event(&mut path, sampler.next_1d(), counters)
+            } else {
+                let tau = sample_free_flight(sampler);
+                self.first_event(&mut path, tau, counters)
+            };
+            match event {
                 Event::Collision { point, medium, regions } => {
                     path.depth += 1;
                     if !self.may_scatter(path.depth) {
                         break;
                     }
-                    let m = self.world.media.medium(medium);
-                    path.throughput *= m.albedo;
-                    let vertex = Vertex::InMedium { phase: m.phase, direction: path.ray.direction };
+                    let (albedo, phase) = self.world.media.scattering(medium, point);
+                    path.throughput *= albedo;
+                    let vertex = Vertex::InMedium { phase, direction: path.ray.direction };
                     path.radiance += path.throughput * self.direct_light(point, &vertex, &regions, sampler, counters);
-                    let direction = m.phase.sample_direction(path.ray.direction, sampler.next_2d());
-                    let pdf = m.phase.pdf_direction(path.ray.direction, direction);
+                    let direction = phase.sample_direction(path.ray.direction, sampler.next_2d());
+                    let pdf = phase.pdf_direction(path.ray.direction, direction);
                     path.origin = Origin::Scattering { point, pdf };
                     path.on_surface = false;
                     path.ray = self.ray(point, direction, regions);
@@ -62,20 +71,29 @@ impl<R: Recorder> Tracer<'_, R> {
         let ray = &mut path.ray;
         let media = &self.world.media;
         let start = media.medium_in(&ray.regions);
-        if let Some(medium) = start
-            && let Some(flight) = media.short_flight(&ray.segment, medium, tau)
-        {
-            let hit = self.visibility.intersect_flight(&flight, !on_surface, counters);
-            return match self.surface_met(hit, &flight, ray.direction) {
-                // The next ray takes them over.
-                None => Event::Collision { point: flight.q, medium, regions: std::mem::take(&mut ray.regions) },
-                Some(surface) => {
-                    // The way to the surface is a part of the flight, but where a ray starts from a surface is beside that.
-                    let regions = media.at_end(&Segment::new(flight.p, surface.point), &ray.regions);
-                    self.crosses_to(path, &regions);
-                    Event::Arrival { surface: Some(surface), regions }
+        if let Some(medium) = start {
+            match media.short_flight(&ray.segment, medium, tau) {
+                ShortFlight::Collides(flight) => {
+                    let hit = self.visibility.intersect_flight(&flight, !on_surface, counters);
+                    return match self.surface_met(hit, &flight, ray.direction) {
+                        // The next ray takes them over.
+                        None => Event::Collision { point: flight.q, medium, regions: std::mem::take(&mut ray.regions) },
+                        Some(surface) => {
+                            // The way to the surface is a part of the flight, but where a ray starts from a surface is beside that.
+                            let regions = media.at_end(&Segment::new(flight.p, surface.point), &ray.regions);
+                            self.crosses_to(path, &regions);
+                            Event::Arrival { surface: Some(surface), regions }
+                        }
+                    };
                 }
-            };
+                ShortFlight::Passes => {
+                    let (surface, free) = self.cast(ray, counters);
+                    let regions = media.at_end(&free, &ray.regions);
+                    self.crosses_to(path, &regions);
+                    return Event::Arrival { surface, regions };
+                }
+                ShortFlight::Unknown => {}
+            }
         }
         let (surface, free) = self.cast(ray, counters);
         if let (None, Some(medium)) = (surface, start)

@@ -5,7 +5,7 @@
 //!
 //! *Cost.* A product or a division.
 
-use vdf_scene::{Phase, Rgb};
+use vdf_scene::{Albedo, Medium, Phase, Rgb};
 
 /// A homogeneous medium, prepared for rendering.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +41,11 @@ impl Homogeneous {
     }
 }
 
-impl From<&vdf_scene::Medium> for Homogeneous {
-    fn from(m: &vdf_scene::Medium) -> Self {
-        Self { sigma_t: m.sigma_t, albedo: m.albedo, phase: m.phase }
+impl Homogeneous {
+    /// The medium, if it is homogeneous, of one extinction for all colours.
+    pub(super) fn of(medium: &Medium) -> Option<Self> {
+        let Albedo::Constant(albedo) = medium.albedo else { return None };
+        medium.sigma_t.grey().map(|sigma_t| Self { sigma_t, albedo, phase: medium.phase })
     }
 }
 

@@ -2,9 +2,9 @@
 
 use smallvec::SmallVec;
 use vdf_geometry::Segment;
-use vdf_scene::MediumId;
+use vdf_scene::{MediumId, Rgb};
 
-use super::{FreeFlight, Media, RegionSet};
+use super::{FreeFlight, Media, RegionSet, Substance};
 
 /// A part of a segment inside one medium (or in vacuum).
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ impl MediumIntervals<'_> {
     #[inline]
     #[must_use]
     pub fn optical_depth(&self) -> f64 {
-        self.intervals.iter().fold(0.0, |tau, (i, _)| tau + self.media.interval_depth(i, self.length))
+        self.intervals.iter().fold(0.0, |tau, (i, _)| tau + self.media.interval_depth(i, &self.segment, self.length))
     }
 
     /// The parts, from the start on.
@@ -49,11 +49,49 @@ impl MediumIntervals<'_> {
         &self.intervals[part].0
     }
 
+    /// The segment.
+    #[inline]
+    #[must_use]
+    pub const fn segment(&self) -> &Segment {
+        &self.segment
+    }
+
     /// Length of the segment in world units.
     #[inline]
     #[must_use]
     pub const fn length(&self) -> f64 {
         self.length
+    }
+
+    /// The optical depth between two distances, which lie in this medium.
+    #[inline(never)]
+    pub(crate) fn depth_in(&self, medium: MediumId, [begin, end]: [f64; 2]) -> f64 {
+        let [t0, t1] = [begin, end].map(|d| d / self.length);
+        self.media.interval_depth(&MediumInterval { medium: Some(medium), t0, t1 }, &self.segment, self.length)
+    }
+
+    /// The distance between two others, which lie in this medium, up to which the optical depth is `tau`; the second if it is less.
+    #[inline(never)]
+    pub(crate) fn distance_in(&self, medium: MediumId, [begin, end]: [f64; 2], tau: f64) -> f64 {
+        let [t0, t1] = [begin, end].map(|d| d / self.length);
+        let part = MediumInterval { medium: Some(medium), t0, t1 };
+        let reached = DepthLeft { tau }.spend(self.media, &part, &self.segment, self.length);
+        reached.map_or(end, |(t, _)| (t * self.length).clamp(begin, end))
+    }
+
+    /// The extinction coefficient at a distance, which lies in this medium.
+    #[inline(never)]
+    pub(crate) fn sigma_t_at(&self, medium: MediumId, distance: f64) -> f64 {
+        match self.media.substance(medium) {
+            Substance::Homogeneous(m) => m.sigma_t,
+            Substance::Heterogeneous(m) => m.sigma_t(&self.segment, distance / self.length),
+        }
+    }
+
+    /// The albedo at a point, which lies in this medium.
+    #[inline(never)]
+    pub(crate) fn albedo_at(&self, medium: MediumId, point: glam::DVec3) -> Rgb {
+        self.media.scattering(medium, point).0
     }
 
     /// The regions at parameter `t` of part number `part`, which must have a medium.
@@ -70,7 +108,7 @@ impl MediumIntervals<'_> {
     pub fn free_flight(&self, tau: f64) -> FreeFlight {
         let mut left = DepthLeft { tau };
         for (i, regions) in &self.intervals {
-            if let Some((t, medium)) = left.spend(self.media, i, self.length) {
+            if let Some((t, medium)) = left.spend(self.media, i, &self.segment, self.length) {
                 let regions = self.media.regions_near(&self.segment, &self.start, t, i, regions);
                 return FreeFlight::Collision { t, medium, regions };
             }
@@ -96,15 +134,28 @@ pub(super) struct DepthLeft {
 impl DepthLeft {
     /// Goes through one interval (`None`), or ends in it: where, and in which medium.
     #[inline]
-    pub(super) fn spend(&mut self, media: &Media, i: &MediumInterval, length: f64) -> Option<(f64, MediumId)> {
-        let depth = media.interval_depth(i, length);
-        if let Some(medium) = i.medium
-            && self.tau < depth
-        {
-            let t = i.t0 + media.medium(medium).distance_at_depth(self.tau, length);
-            return Some((t.min(i.t1), medium));
+    pub(super) fn spend(
+        &mut self,
+        media: &Media,
+        i: &MediumInterval,
+        segment: &Segment,
+        length: f64,
+    ) -> Option<(f64, MediumId)> {
+        let medium = i.medium?;
+        match media.substance(medium) {
+            Substance::Homogeneous(homogeneous) => {
+                let depth = homogeneous.optical_depth((i.t1 - i.t0) * length);
+                if self.tau < depth {
+                    let t = i.t0 + homogeneous.distance_at_depth(self.tau, length);
+                    return Some((t.min(i.t1), medium));
+                }
+                self.tau -= depth;
+            }
+            Substance::Heterogeneous(of) => match of.distance(segment, [i.t0, i.t1], length, self.tau) {
+                Ok(t) => return Some((t, medium)),
+                Err(depth) => self.tau -= depth,
+            },
         }
-        self.tau -= depth;
         None
     }
 }

@@ -2,9 +2,12 @@
 //!
 //! The interface that integrators use, whatever the medium: a path carries the [`RegionSet`] of where it is, [`Media::intervals`] cuts a
 //! segment at the boundaries of regions (`regions.rs`), and optical depths and distances within an interval are the medium's own affair,
-//! one file a kind. [`Homogeneous`] is the first kind.
+//! one file a kind: [`Homogeneous`], and `heterogeneous.rs` for those that change in space (`grid/`).
 
+mod chromatic;
 mod extent;
+mod grid;
+mod heterogeneous;
 mod homogeneous;
 mod intervals;
 mod regions;
@@ -16,23 +19,32 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 use smallvec::SmallVec;
-use vdf_geometry::Segment;
-use vdf_scene::{Boundary, Medium, MediumId, Scene};
+use vdf_geometry::{Bounds, Segment};
+use vdf_scene::{Boundary, Medium, MediumId, Phase, Rgb, Scene};
 
 pub use self::{
     homogeneous::Homogeneous,
     intervals::{MediumInterval, MediumIntervals},
     regions::RegionSet,
 };
-use self::{intervals::DepthLeft, regions::Regions};
+
+use self::{heterogeneous::Heterogeneous, intervals::DepthLeft, regions::Regions};
 
 /// The media of a scene and the regions that they fill, prepared for walks along segments.
 #[derive(Debug)]
 pub struct Media {
-    media: Vec<Homogeneous>,
+    media: Vec<Substance>,
+    is_chromatic: bool,
     regions: Regions,
     /// The regions that the camera is inside of.
     at_camera: RegionSet,
+}
+
+/// What a medium is made of.
+#[derive(Debug)]
+pub(crate) enum Substance {
+    Homogeneous(Homogeneous),
+    Heterogeneous(Box<Heterogeneous>),
 }
 
 /// What a free flight along a segment comes to.
@@ -51,13 +63,37 @@ pub enum FreeFlight {
     Passed(RegionSet),
 }
 
+/// What is known of a free flight without a look at what lies beyond its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShortFlight {
+    /// It is this, ends in the medium in which it starts before the segment does, and crosses no boundary.
+    Collides(Segment),
+    /// There is no collision on the segment, whatever lies on it.
+    Passes,
+    /// Nothing.
+    Unknown,
+}
+
+impl ShortFlight {
+    /// The way to the collision, if there is one.
+    #[must_use]
+    pub const fn collision(self) -> Option<Segment> {
+        match self {
+            Self::Collides(flight) => Some(flight),
+            Self::Passes | Self::Unknown => None,
+        }
+    }
+}
+
 impl Media {
     /// Prepares media and boundaries, which have to be closed, each alone or together; `ambient` is the medium outside of all boundaries. Cost: that of a hierarchy
     /// over the triangles of the boundaries.
     #[must_use]
     pub fn new(media: &[Medium], boundaries: &[Boundary], ambient: Option<MediumId>) -> Self {
         let regions = Regions::new(media, boundaries, ambient);
-        Self { media: media.iter().map(Homogeneous::from).collect(), regions, at_camera: RegionSet::default() }
+        let media: Vec<_> = media.iter().map(Substance::new).collect();
+        let is_chromatic = media.iter().any(|m| matches!(m, Substance::Heterogeneous(m) if m.is_chromatic()));
+        Self { media, is_chromatic, regions, at_camera: RegionSet::default() }
     }
 
     /// Prepares the media of a scene. The ambient medium is the sensor's if the camera is outside of all boundaries, else what the outermost
@@ -73,16 +109,29 @@ impl Media {
 
     /// The medium with this number.
     #[inline]
-    #[must_use]
-    pub fn medium(&self, id: MediumId) -> &Homogeneous {
+    pub(crate) fn substance(&self, id: MediumId) -> &Substance {
         &self.media[id.0 as usize]
     }
 
-    /// The least extinction coefficient of a medium that takes something away; infinite if none does.
+    /// The albedo of a medium at a point, and its phase function.
+    #[inline]
+    #[must_use]
+    pub fn scattering(&self, id: MediumId, point: DVec3) -> (Rgb, Phase) {
+        match self.substance(id) {
+            Substance::Homogeneous(m) => (m.albedo, m.phase),
+            Substance::Heterogeneous(m) => (m.albedo(point), m.phase),
+        }
+    }
+
+    /// The least extinction coefficient of a medium that takes something away, of one that changes in space a typical one; infinite if none does.
     #[inline]
     #[must_use]
     pub fn least_sigma_t(&self) -> f64 {
-        self.media.iter().map(|m| m.sigma_t).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min)
+        let typical = |m: &Substance| match m {
+            Substance::Homogeneous(m) => m.sigma_t,
+            Substance::Heterogeneous(m) => m.typical(),
+        };
+        self.media.iter().map(typical).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min)
     }
 
     /// The medium of a point in these regions, that of the innermost; `None` is vacuum.
@@ -112,6 +161,16 @@ impl Media {
         self.regions.at_end(segment, start)
     }
 
+    /// Where the medium outside of all boundaries ends; empty if there is none, or it has no end.
+    #[must_use]
+    pub(crate) fn ambient_bounds(&self) -> Bounds {
+        let ambient = self.regions.medium(&RegionSet::default()).map(|id| self.substance(id));
+        match ambient {
+            Some(Substance::Heterogeneous(m)) => m.bounds().unwrap_or(Bounds::EMPTY),
+            _ => Bounds::EMPTY,
+        }
+    }
+
     /// True if the segment crosses no boundary of a medium.
     #[inline]
     #[must_use]
@@ -126,14 +185,14 @@ impl Media {
         (-self.optical_depth(segment, start)).exp()
     }
 
-    /// ∫σ_t along the segment, which starts in `start`.
+    /// ∫σ_t along the segment, which starts in `start`. Where a medium is chromatic it is that of red; see [`Media::optical_depths`].
     #[inline]
     #[must_use]
     pub fn optical_depth(&self, segment: &Segment, start: &RegionSet) -> f64 {
         let length = segment.length();
         let mut tau = 0.0;
         let _ = self.regions.walk(segment, start, |i, _| {
-            tau += self.interval_depth(&i, length);
+            tau += self.interval_depth(&i, segment, length);
             ControlFlow::<()>::Continue(())
         });
         tau
@@ -146,7 +205,7 @@ impl Media {
     pub fn free_flight(&self, segment: &Segment, start: &RegionSet, tau: f64) -> FreeFlight {
         let length = segment.length();
         let mut left = DepthLeft { tau };
-        let spend = |i: MediumInterval, regions: &RegionSet| match left.spend(self, &i, length) {
+        let spend = |i: MediumInterval, regions: &RegionSet| match left.spend(self, &i, segment, length) {
             Some((t, medium)) => ControlFlow::Break((t, medium, i, regions.clone())),
             None => ControlFlow::Continue(()),
         };
@@ -200,18 +259,25 @@ impl Media {
         }
     }
 
-    /// The path of a free flight of optical depth `tau` that starts in `medium`, if it ends in this medium before the segment does and
-    /// crosses no boundary; found without a look at what lies beyond. `None` says nothing.
+    /// What can be said of a free flight of optical depth `tau` that starts in `medium` without a look at what lies beyond its end.
     #[inline]
     #[must_use]
-    pub fn short_flight(&self, segment: &Segment, medium: MediumId, tau: f64) -> Option<Segment> {
-        let t = self.medium(medium).distance_at_depth(tau, segment.length());
+    pub fn short_flight(&self, segment: &Segment, medium: MediumId, tau: f64) -> ShortFlight {
+        let t = match self.substance(medium) {
+            Substance::Homogeneous(m) => m.distance_at_depth(tau, segment.length()),
+            Substance::Heterogeneous(m) => match m.distance(segment, [0.0, 1.0], segment.length(), tau) {
+                Ok(t) => t,
+                // The medium is in a part of the segment, and there is no other.
+                Err(_) if self.media.len() == 1 => return ShortFlight::Passes,
+                Err(_) => return ShortFlight::Unknown,
+            },
+        };
         // No extinction or no length gives infinity or NaN.
         if t >= 1.0 || t.is_nan() {
-            return None;
+            return ShortFlight::Unknown;
         }
         let flight = Segment::new(segment.p, segment.at(t));
-        self.regions.are_not_crossed(&flight).then_some(flight)
+        if self.regions.are_not_crossed(&flight) { ShortFlight::Collides(flight) } else { ShortFlight::Unknown }
     }
 
     /// True only if a flight of optical depth `tau`, if no surface stops it, does not collide: it starts in `medium`, leaves it where it is
@@ -223,13 +289,26 @@ impl Media {
     #[inline]
     #[must_use]
     pub fn leaves_for_good(&self, segment: &Segment, medium: MediumId, tau: f64) -> bool {
-        let t = self.medium(medium).distance_at_depth(tau, segment.length());
+        let Substance::Homogeneous(m) = self.substance(medium) else { return false };
+        let t = m.distance_at_depth(tau, segment.length());
         // NaN, too, becomes 1.
         self.regions.are_left_for_good(segment.p, segment.at(t.min(1.0)))
     }
 
     #[inline]
-    fn interval_depth(&self, i: &MediumInterval, length: f64) -> f64 {
-        i.medium.map_or(0.0, |m| self.medium(m).optical_depth((i.t1 - i.t0) * length))
+    fn interval_depth(&self, i: &MediumInterval, segment: &Segment, length: f64) -> f64 {
+        i.medium.map_or(0.0, |m| match self.substance(m) {
+            Substance::Homogeneous(m) => m.optical_depth((i.t1 - i.t0) * length),
+            Substance::Heterogeneous(m) => m.optical_depth(segment, [i.t0, i.t1], length),
+        })
+    }
+}
+
+impl Substance {
+    fn new(medium: &Medium) -> Self {
+        match Homogeneous::of(medium) {
+            Some(homogeneous) => Self::Homogeneous(homogeneous),
+            None => Self::Heterogeneous(Box::new(Heterogeneous::new(medium))),
+        }
     }
 }

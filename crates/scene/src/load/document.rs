@@ -4,13 +4,12 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::features::FOREIGN_TAGS;
 use super::names;
 use crate::SceneError;
 
 /// Elements that describe an object, with a plugin `type`.
-pub(super) const OBJECT_TAGS: [&str; 10] =
-    ["bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "sensor", "texture"];
+pub(super) const OBJECT_TAGS: [&str; 11] =
+    ["bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "sensor", "texture", "volume"];
 /// Elements that describe a property.
 pub(super) const PROPERTY_TAGS: [&str; 7] = ["boolean", "float", "integer", "rgb", "spectrum", "string", "transform"];
 
@@ -78,7 +77,7 @@ impl Element {
     /// True if it describes an object rather than a property.
     pub(super) fn is_object(&self) -> bool {
         let tag = self.tag.as_str();
-        tag == "shape" || OBJECT_TAGS.contains(&tag) || FOREIGN_TAGS.contains(&tag)
+        tag == "shape" || OBJECT_TAGS.contains(&tag)
     }
 
     fn contains(&self, serial: usize) -> bool {

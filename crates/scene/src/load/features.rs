@@ -4,12 +4,10 @@
 use std::collections::HashMap;
 
 use super::document::{Element, Place};
-use super::{names, transform};
+use super::names;
 use crate::SceneError;
 use crate::text::quoted;
 
-/// Objects of Mitsuba's that are known, but not read at all.
-pub(super) const FOREIGN_TAGS: [&str; 1] = ["volume"];
 /// More features are counted, not named.
 const MOST_NAMED: usize = 12;
 
@@ -39,7 +37,7 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
         "integrator" => {
             &["volpath", "volpathmis", "path", "direct", "prb", "prbvolpath", "prb_basic", "moment", "aov", "stokes"]
         }
-        "medium" => &["homogeneous"],
+        "medium" => &["homogeneous", "heterogeneous"],
         "phase" => &["isotropic", "hg"],
         "rfilter" => &["box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"],
         "sampler" => &["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
@@ -48,6 +46,7 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
             &["obj", "ply", "serialized", "cube", "rectangle", "sphere", "disk", "cylinder", "shapegroup", "instance"]
         }
         "texture" => &["bitmap", "checkerboard", "mesh_attribute", "rawconstant"],
+        "volume" => &["gridvolume", "constvolume"],
         _ => &[],
     }
 }
@@ -56,25 +55,10 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
 pub(super) fn unsupported(element: &Element, kind: &str, kinds: &[&str]) -> SceneError {
     let at = element.attribute("type").map_or(&element.at, |a| &a.at);
     let (tag, mut help) = (&element.tag, names::suggest(kind, kinds));
-    match (tag.as_str(), kind) {
-        ("film", "specfilm") => {
-            help =
-                "it records a spectrum, and vdf renders red, green and blue: write <film type=\"hdrfilm\">".to_owned();
-        }
-        ("volume", _) => help = format!("write a value in place of the {tag}, as <rgb> or <float>"),
-        _ => {}
+    if (tag.as_str(), kind) == ("film", "specfilm") {
+        help = "it records a spectrum, and vdf renders red, green and blue: write <film type=\"hdrfilm\">".to_owned();
     }
     at.error(format!("{tag} type \"{kind}\" is not supported"), help)
-}
-
-/// The error that the channels of a colour differ where they must be equal.
-pub(super) fn chromatic(element: &Element) -> SceneError {
-    let text = |name| element.attribute(name).map_or("", |a| a.value.as_str());
-    let name = text("name");
-    element.at.error(
-        format!("chromatic {name} ({}) is not supported", quoted(text("value"))),
-        format!("give the three channels one value, or write <float name=\"{name}\" …>; the albedo may be chromatic"),
-    )
 }
 
 /// A kind of thing that the scene has and that is not read.
@@ -133,17 +117,11 @@ fn feature(element: &Element) -> Option<String> {
     let kind = element.attribute("type").map(|kind| kind.value.as_str());
     match (element.tag.as_str(), kind) {
         ("spectrum", Some(kind)) => Some(format!("spectrum {}", quoted(kind))),
-        ("rgb", _) if is_chromatic_extinction(element) => Some("chromatic sigma_t".to_owned()),
         (tag, Some(kind)) if element.is_object() && !kinds(tag).contains(&kind) => {
             Some(format!("{tag} {}", quoted(kind)))
         }
         _ => None,
     }
-}
-
-fn is_chromatic_extinction(element: &Element) -> bool {
-    let is_extinction = element.attribute("name").is_some_and(|name| name.value == "sigma_t");
-    is_extinction && transform::numbers(element, "value").is_ok_and(|v| matches!(v[..], [x, y, z] if x != y || y != z))
 }
 
 impl Feature<'_> {
@@ -153,7 +131,6 @@ impl Feature<'_> {
         let colour = "write one number, or the colour as <rgb name=\"…\" value=\"red, green, blue\"/>";
         match (element.tag.as_str(), kind) {
             ("spectrum", Some(kind)) => kind.at.error(format!("{} is not supported", self.name), colour),
-            ("rgb", _) => chromatic(element),
             (tag, kind) => unsupported(element, kind.map_or("", |kind| &kind.value), kinds(tag)),
         }
     }

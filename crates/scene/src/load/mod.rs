@@ -25,8 +25,11 @@ mod tests_hostile;
 mod tests_mitsuba;
 #[cfg(test)]
 mod tests_surfaces;
+#[cfg(test)]
+mod tests_volumes;
 mod textures;
 mod transform;
+mod volumes;
 mod xml;
 
 use std::cell::RefCell;
@@ -63,7 +66,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] if a file cannot be read, or says what is wrong or not supported. So that a file from anywhere can be tried, only plain files
     /// are opened (no pipes, no devices), and there are limits: 64 MiB and a million elements of XML with all includes, 8 GiB of meshes, 2²⁸
-    /// triangles, 2²⁸ pixels of pictures, 32 levels of elements, 15 of includes, 16 attributes an element. Polygons that are not convex may take 2²⁸ steps in each mesh,
+    /// triangles, 2²⁸ pixels of pictures, 2³⁰ numbers of volumes, 32 levels of elements, 15 of includes, 16 attributes an element. Polygons that are not convex may take 2²⁸ steps in each mesh,
     /// about two seconds; more have to be cut into triangles beforehand.
     ///
     /// # Cost
@@ -85,6 +88,7 @@ impl Scene {
             ids: Ids::collect(&root)?,
             warnings: RefCell::default(),
             pictures: RefCell::default(),
+            grids: RefCell::default(),
             mesh_bytes: 0,
             triangles: 0,
             copies: 0,
@@ -109,6 +113,7 @@ struct Loader<'a> {
     ids: Ids<'a>,
     warnings: RefCell<Vec<String>>,
     pictures: RefCell<textures::Pictures>,
+    grids: RefCell<volumes::Grids>,
     /// Bytes of meshes that were read so far.
     mesh_bytes: u64,
     /// Triangles of mesh files so far.
@@ -147,6 +152,7 @@ impl<'a> Loader<'a> {
                 // Read where they are used; here only checked, so that an unused one cannot hide a mistake.
                 "bsdf" => drop(materials::bsdf(&self, element)?),
                 "texture" => drop(textures::read(&self, element)?),
+                "volume" => drop(volumes::read(&self, element)?),
                 "phase" => drop(objects::phase(&self, element)?),
                 "emitter" => {
                     let Some(emitter) = objects::emitter(&self, element)? else { continue };
@@ -168,7 +174,7 @@ impl<'a> Loader<'a> {
                     let help = if OBJECT_TAGS.contains(&tag) {
                         "film and sampler belong inside <sensor>, rfilter inside <film>"
                     } else {
-                        "a property belongs inside an object; supported here: integrator, sensor, shape, emitter, medium, phase, bsdf, texture, default, include, alias"
+                        "a property belongs inside an object; supported here: integrator, sensor, shape, emitter, medium, phase, bsdf, texture, volume, default, include, alias"
                     };
                     return Err(element.at.error(format!("<{tag}> directly inside <scene>"), help));
                 }

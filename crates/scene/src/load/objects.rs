@@ -4,8 +4,8 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use super::document::Element;
 use super::properties::Object;
-use super::{Loader, camera, features, textures};
-use crate::{Emitter, Medium, MediumId, Phase};
+use super::{Loader, camera, features, textures, volumes};
+use crate::{Albedo, Emitter, Medium, MediumId, Phase};
 use crate::{Rgb, SceneError, Slide, Texture};
 
 /// The medium's index; each is read once, however often it is referred to.
@@ -17,22 +17,19 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
     // How light is looked for, not what there is.
     object.boolean("sample_emitters", true)?;
     object.boolean("has_spectral_extinction", true)?;
-    let albedo = object.reflectance(loader, "albedo", 0.75)?;
+    let albedo = match object.volume_element("albedo")? {
+        Some(volume) => volumes::albedo(loader, volume)?,
+        None => Albedo::Constant(object.reflectance(loader, "albedo", 0.75)?),
+    };
     let scale = object.float_where("scale", 1.0, |v| v >= 0.0, "at least 0")?;
-    let sigma_t = object.grey("sigma_t", 1.0)?;
-    if sigma_t < 0.0 || !(sigma_t * scale).is_finite() {
-        let at = object.place_of("sigma_t");
-        return Err(
-            at.error(format!("the extinction is {}", sigma_t * scale), "sigma_t × scale must be finite and at least 0")
-        );
-    }
+    let sigma_t = volumes::extinction(loader, &mut object, scale)?;
     let phase = match object.at_most_one("phase")? {
         Some(nested) => phase(loader, nested.object)?,
         None => Phase::Isotropic,
     };
     object.finish()?;
     let id = MediumId(u32::try_from(loader.media.len()).unwrap_or(u32::MAX));
-    loader.media.push(Medium { sigma_t: sigma_t * scale, albedo, phase });
+    loader.media.push(Medium { sigma_t, albedo, phase });
     loader.medium_of_element.insert(element.serial, id);
     Ok(id)
 }

@@ -281,14 +281,23 @@ impl<'a> Object<'a> {
 
     /// The texture of that name, nested or referred to.
     pub(super) fn texture_element(&mut self, name: &'static str) -> Result<Option<&'a Element>, SceneError> {
+        self.named("texture", name)
+    }
+
+    /// The volume of that name, nested or referred to.
+    pub(super) fn volume_element(&mut self, name: &'static str) -> Result<Option<&'a Element>, SceneError> {
+        self.named("volume", name)
+    }
+
+    fn named(&mut self, tag: &str, name: &'static str) -> Result<Option<&'a Element>, SceneError> {
         self.asked_properties.push(name);
         let mut found = None;
         for (child, target, used) in &mut self.children {
-            let Some(object) = target.filter(|t| t.tag == "texture") else { continue };
+            let Some(object) = target.filter(|t| t.tag == tag) else { continue };
             if child.attribute("name").is_some_and(|a| a.value == name) {
                 *used = true;
                 if found.replace(object).is_some() {
-                    return Err(child.at.error(format!("a second texture \"{name}\""), "remove one of them"));
+                    return Err(child.at.error(format!("a second {tag} \"{name}\""), "remove one of them"));
                 }
             }
         }
@@ -345,27 +354,36 @@ impl<'a> Object<'a> {
         self.property(name, &["transform"])
     }
 
-    /// A number, or a colour whose channels are equal.
-    pub(super) fn grey(&mut self, name: &'static str, default: f64) -> Result<f64, SceneError> {
-        let Some(element) = self.property(name, &["float", "rgb", "spectrum"])? else { return Ok(default) };
-        let value = match element.tag.as_str() {
-            "float" => return number(element),
-            "spectrum" if element.attribute("filename").is_none() => {
-                DVec3::splat(transform::parse(element.require("value")?, &element.at)?)
-            }
-            "spectrum" => return Err(element.at.error(format!("\"{name}\" from a file"), "write one number")),
-            _ => rgb(element)?,
+    /// An extinction coefficient: a number or a colour, each channel finite and at least 0.
+    pub(super) fn extinction(
+        &mut self,
+        loader: &Loader<'_>,
+        name: &'static str,
+        default: f64,
+    ) -> Result<DVec3, SceneError> {
+        let Some(element) = self.property(name, &["float", "integer", "rgb", "spectrum"])? else {
+            return Ok(DVec3::splat(default));
         };
-        if value.x != value.y || value.y != value.z {
-            return Err(features::chromatic(element));
+        let value = match element.tag.as_str() {
+            "rgb" => rgb(element)?,
+            "spectrum" => {
+                let value = spectrum(loader, element, Weighed::ByDaylight)?;
+                if is_flat(element) { value } else { value.max(DVec3::ZERO) }
+            }
+            _ => DVec3::splat(number(element)?),
+        };
+        if !(value.is_finite() && value.cmpge(DVec3::ZERO).all()) {
+            let message = format!("\"{name}\" is {}, {}, {}", value.x, value.y, value.z);
+            return Err(element.at.error(message, "each channel must be finite and at least 0"));
         }
-        if value.x > 1.0 && element.tag == "rgb" {
+        let most = value.max_element();
+        if most > 1.0 && element.tag == "rgb" {
             return Err(element.at.error(
-                format!("\"{name}\" as <rgb> is {}, more than 1", value.x),
+                format!("\"{name}\" as <rgb> is {most}, more than 1"),
                 format!("Mitsuba refuses that: write <float name=\"{name}\" …>, or use \"scale\""),
             ));
         }
-        Ok(value.x)
+        Ok(value)
     }
 
     /// A point.

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::document::{Attribute, Element, OBJECT_TAGS, PROPERTY_TAGS, Place};
-use super::features::FOREIGN_TAGS;
 use super::lines::Lines;
 use super::parameters::Parameters;
 use super::search::Search;
@@ -229,7 +228,7 @@ fn allowed_attributes(tag: &str, at: &Place) -> Result<&'static [&'static str], 
         "alias" => &["id", "as"],
         "ref" => &["id", "name"],
         "shape" => &["type", "id", "name"],
-        _ if OBJECT_TAGS.contains(&tag) || FOREIGN_TAGS.contains(&tag) => &["type", "id", "name"],
+        _ if OBJECT_TAGS.contains(&tag) => &["type", "id", "name"],
         "boolean" | "integer" | "float" | "string" | "rgb" => &["name", "value"],
         "spectrum" => &["name", "value", "type", "filename"],
         "vector" | "point" => &["name", "value", "x", "y", "z"],

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::{DVec3, Vec3};
 
 use super::LoadOptions;
-use crate::{Bsdf, EmbeddedFile, Emitter, Phase, Projection, Scene, SceneError, SceneSource};
+use crate::{Bsdf, EmbeddedFile, Emitter, Extinction, Phase, Projection, Scene, SceneError, SceneSource};
 
 pub(super) const HEAD: &str = "<scene version='3.0.0'>\n<integrator type='volpath'/>\n";
 pub(super) const FILM: &str = "<film type='hdrfilm'/>";
@@ -13,7 +13,7 @@ pub(super) const FOG: &str = "<medium type='homogeneous' id='fog'/>";
 pub(super) const LIGHT: &str = "<emitter type='point'/>";
 
 pub(super) fn file(path: &str, text: &str) -> EmbeddedFile {
-    EmbeddedFile { path: Cow::Owned(path.to_owned()), text: Cow::Owned(text.to_owned()) }
+    EmbeddedFile { path: Cow::Owned(path.to_owned()), bytes: Cow::Owned(text.as_bytes().to_owned()) }
 }
 
 pub(super) fn load_with(text: &str, others: &[(&str, &str)], defines: &[(&str, &str)]) -> Result<Scene, SceneError> {
@@ -170,7 +170,6 @@ fn values_outside_their_range_are_refused() {
         refused(&bsdf(bad), "3:22", "");
     }
     let medium = |inner: &str| format!("<medium type='homogeneous'>{inner}</medium>");
-    refused(&medium("<rgb name='sigma_t' value='.1 .2 .3'/>"), "3:28", "chromatic sigma_t");
     refused(&medium("<rgb name='sigma_t' value='2'/>"), "3:28", "more than 1");
     refused(&medium("<float name='sigma_t' value='-1'/>"), "3:28", "at least 0");
     refused(&medium("<phase type='hg'><float name='g' value='1'/></phase>"), "3:45", "between -1 and 1");
@@ -189,9 +188,14 @@ fn media_are_read_with_scale_and_phase() {
     let scene = load(
         "<medium type='homogeneous'><rgb name='sigma_t' value='.5'/><float name='scale' value='4'/><rgb name='albedo' value='.1, .2 .3'/><phase type='hg'/></medium>",
     );
-    assert!((scene.media[0].sigma_t - 2.0).abs() < 1e-12);
-    assert_eq!(scene.media[0].albedo, Vec3::new(0.1, 0.2, 0.3));
+    assert_eq!(scene.media[0].sigma_t, 2.0.into());
+    assert_eq!(scene.media[0].albedo, Vec3::new(0.1, 0.2, 0.3).into());
     assert_eq!(scene.media[0].phase, Phase::HenyeyGreenstein { g: 0.8 });
+    // Of colours, too.
+    let scene = load(
+        "<medium type='homogeneous'><rgb name='sigma_t' value='.1 .2 .3'/><float name='scale' value='10'/></medium>",
+    );
+    assert_eq!(scene.media[0].sigma_t, Extinction::Constant(DVec3::new(0.1, 0.2, 0.3) * 10.0));
 }
 
 #[test]

@@ -111,7 +111,8 @@ fn spectra_that_are_constant_are_read() {
         named("albedo")
     ));
     assert_eq!(loaded.surfaces[0].bsdf, Bsdf::lambertian(Vec3::splat(0.5), Vec3::ZERO));
-    assert_eq!((loaded.media[0].sigma_t, loaded.media[0].albedo), (3.0, Vec3::splat(0.5)));
+    assert_eq!(loaded.media[0].sigma_t, 3.0.into());
+    assert_eq!(loaded.media[0].albedo, Vec3::splat(0.5).into());
     // Equal energy is not white: seen in Mitsuba 3.9.1.
     let Emitter::Constant { radiance } = loaded.emitters[0].clone() else { panic!("not constant") };
     assert!((radiance - Vec3::new(0.602_397, 0.474_146, 0.454_458)).abs().max_element() < 1e-6, "{radiance}");
@@ -270,15 +271,15 @@ fn all_features_that_a_scene_lacks_are_named_at_once() {
          <texture type='wood' name='diffuse_reflectance'/></bsdf></bsdf></shape>\n\
          <shape type='hair'><string name='filename' value='none.hair'/></shape>\n\
          <bsdf type='diffuse' id='b'><spectrum name='reflectance' type='d65'><float name='scale' value='1'/></spectrum></bsdf>\n\
-         <medium type='homogeneous'><rgb name='sigma_t' value='1 2 3'/></medium>";
+         <phase type='sggx'/>";
     let list = "6 features of this scene are not supported: emitter \"sunsky\" (s.xml:3), shape \"hair\" (s.xml:4 and 1 more), \
                 bsdf \"measured\" (s.xml:4), texture \"wood\" (s.xml:4), \
-                spectrum \"d65\" (s.xml:6), chromatic sigma_t (s.xml:7)\n";
+                spectrum \"d65\" (s.xml:6), phase \"sggx\" (s.xml:7)\n";
     refused(body, "3:1", list);
     refused(
         body,
         "3:1",
-        "principled, principledthin, null; emitter point, constant, area, envmap, spot, projector, directional; shape obj",
+        "principled, principledthin, null; emitter point, constant, area, envmap, spot, projector, directional; phase isotropic, hg; shape obj",
     );
     // One alone has its own message, before any file is looked for.
     let hair = "<shape type='obj'><string name='filename' value='none.obj'/></shape><shape type='hair'/>";

@@ -17,7 +17,7 @@ mod building;
 mod furniture;
 mod plants;
 
-use super::{MeshFunction, Recipe, shapes::Placement};
+use super::{MeshFunction, Recipe, Size, shapes::Placement};
 
 /// Half the length and the width between the arcades' columns.
 const HALF: [f64; 2] = [30.2, 9.2];
@@ -37,7 +37,7 @@ const FIXED: [MeshFunction; 5] = [PLASTER, STONE, PAVING, TERRACOTTA, WOOD];
 
 pub(super) static RECIPE: Recipe = Recipe {
     name: "san-miguel",
-    default_triangles: 250_000,
+    default_size: Size::Triangles(250_000),
     scene: ("san-miguel.xml", include_str!("san-miguel.xml")),
     meshes: &[
         ("meshes/san-miguel_plaster.obj", PLASTER),
@@ -47,6 +47,7 @@ pub(super) static RECIPE: Recipe = Recipe {
         ("meshes/san-miguel_wood.obj", WOOD),
         ("meshes/san-miguel_leaves.obj", plants::leaves),
     ],
+    volumes: &[],
 };
 
 /// How finely round things are made: finer in larger scenes, but leaves get most of the triangles.

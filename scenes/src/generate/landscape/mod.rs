@@ -8,11 +8,11 @@
 mod plants;
 mod terrain;
 
-use super::Recipe;
+use super::{Recipe, Size};
 
 pub(super) static RECIPE: Recipe = Recipe {
     name: "scape",
-    default_triangles: 130_000,
+    default_size: Size::Triangles(130_000),
     scene: ("scape.xml", include_str!("scape.xml")),
     meshes: &[
         ("meshes/scape_grass.obj", terrain::grass),
@@ -22,4 +22,5 @@ pub(super) static RECIPE: Recipe = Recipe {
         ("meshes/scape_bark.obj", plants::bark),
         ("meshes/scape_needles.obj", plants::needles),
     ],
+    volumes: &[],
 };

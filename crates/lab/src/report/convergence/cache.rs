@@ -194,7 +194,8 @@ mod tests {
         let mut moved = scene(&small);
         moved.surfaces[3].triangles[1].vertices[2].x += 1e-4;
         let mut dimmed = scene(&small);
-        dimmed.media[0].sigma_t *= 1.0 + f64::EPSILON;
+        let sigma_t = dimmed.media[0].sigma_t.grey().expect("grey fog");
+        dimmed.media[0].sigma_t = (sigma_t * (1.0 + f64::EPSILON)).into();
         let others = [
             key(&scene(&[("width", "9"), ("height", "8")]), Integrator::Volpath, 4),
             key(&scene(&[small[0], small[1], ("max_depth", "3")]), Integrator::Volpath, 4),

@@ -178,13 +178,13 @@ fn dependencies(options: &ThesisOptions, methods: &[Method]) -> String {
     let methods: Vec<_> = methods.iter().map(|m| m.name()).collect();
     // Generated scenes change with the program only.
     let boxes = ThesisOptions::SCENES.iter().filter(|name| name.starts_with("cbox")).filter_map(|name| builtin(name));
-    let texts: String =
-        boxes.flat_map(|source| source.files().iter().map(|f| f.text.to_string()).collect::<Vec<_>>()).collect();
+    let texts: Vec<u8> =
+        boxes.flat_map(|source| source.files().iter().flat_map(|f| f.bytes.to_vec()).collect::<Vec<_>>()).collect();
     format!(
         "size {size}, seed {seed}, quick {quick}, {} threads, methods {}, boxes {:08x}",
         options.threads(),
         methods.join(","),
-        crc32fast::hash(texts.as_bytes())
+        crc32fast::hash(&texts)
     )
 }
 

@@ -158,10 +158,10 @@ fn open_boundaries_close_together() {
     let wall =
         Boundary { triangles: wall, interior: Some(MediumId(0)), exterior: Some(MediumId(1)), ..Boundary::default() };
     let boundaries = [boundary(left, 0), boundary(right, 1), wall];
-    let medium = |sigma_t| Medium { sigma_t, albedo: Rgb::ONE, phase: Phase::Isotropic };
+    let medium = |sigma_t| Medium::new(sigma_t, Rgb::ONE, Phase::Isotropic);
     for (media, expected) in [
         ([medium(1.0), medium(2.0)], [Some(MediumId(0)), Some(MediumId(1))]),
-        ([medium(1.0); 2], [Some(MediumId(0)); 2]),
+        ([medium(1.0), medium(1.0)], [Some(MediumId(0)); 2]),
     ] {
         let regions = Regions::new(&media, &boundaries, None);
         let s = Segment::new(dvec3(-1.0, 0.4, 0.4), dvec3(3.0, 0.5, 0.6));

@@ -8,12 +8,13 @@ mod tests;
 mod tree;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use vdf_geometry::{Bounds, Triangle};
 
 use super::Loader;
 use super::document::{Element, Place};
-use crate::{FilmSettings, Medium, MediumId, Phase, SceneError, Sensor};
+use crate::{Albedo, Extinction, FilmSettings, GridVolume, Medium, MediumId, Phase, SceneError, Sensor};
 
 use closed::{Closed, Work};
 use tree::Tree;
@@ -37,7 +38,9 @@ pub(super) fn media_are_consistent(
         if !same(loader, around.inner, sensor.medium) {
             return Err(wrong_around_camera(around, sensor, sensor_at));
         }
-    } else if let (Some(_), Some(constant_at)) = (sensor.medium, constant_at) {
+    } else if let (Some(Extinction::Constant(_)), Some(constant_at)) =
+        (medium(loader, sensor.medium).map(|m| &m.sigma_t), constant_at)
+    {
         return Err(constant_at.error(
             "unbounded fog together with an infinite emitter: no light comes through an infinite medium",
             format!("put a closed null shape with the medium as interior around the camera (sensor at {sensor_at}), or use point or area emitters"),
@@ -124,8 +127,8 @@ fn wrong_around_camera(around: &Closed<'_>, sensor: &Sensor, sensor_at: &Place) 
     )
 }
 
-fn medium(loader: &Loader<'_>, id: Option<MediumId>) -> Option<Medium> {
-    id.and_then(|MediumId(i)| loader.media.get(i as usize)).copied()
+fn medium<'l>(loader: &'l Loader<'_>, id: Option<MediumId>) -> Option<&'l Medium> {
+    id.and_then(|MediumId(i)| loader.media.get(i as usize))
 }
 
 /// Equal by value: two copies of one fog are one fog.
@@ -133,14 +136,30 @@ fn same(loader: &Loader<'_>, a: Option<MediumId>, b: Option<MediumId>) -> bool {
     medium(loader, a) == medium(loader, b)
 }
 
-/// The bits of a medium.
-fn key(Medium { sigma_t, albedo, phase }: Medium) -> ([u64; 2], [u32; 3]) {
-    // No mean cosine has the bits of 2.
-    let g = match phase {
-        Phase::Isotropic => 2.0,
-        Phase::HenyeyGreenstein { g } => g,
+/// The bits of a medium; of a grid, those of its place in memory.
+fn key(Medium { sigma_t, albedo, phase }: &Medium) -> Vec<u64> {
+    let mut key = Vec::new();
+    let volume = |key: &mut Vec<u64>, GridVolume { grid, filter, wrap, grid_from_world }: &GridVolume| {
+        key.extend([Arc::as_ptr(grid) as u64, *filter as u64, *wrap as u64]);
+        key.extend(grid_from_world.to_cols_array().map(f64::to_bits));
     };
-    ([sigma_t, g].map(f64::to_bits), albedo.to_array().map(f32::to_bits))
+    match sigma_t {
+        Extinction::Constant(sigma_t) => key.extend(sigma_t.to_array().map(f64::to_bits)),
+        Extinction::Grid { volume: of, scale } => {
+            key.push(scale.to_bits());
+            volume(&mut key, of);
+        }
+    }
+    match albedo {
+        Albedo::Constant(albedo) => key.extend(albedo.to_array().map(|x| u64::from(x.to_bits()))),
+        Albedo::Grid(of) => volume(&mut key, of),
+    }
+    // No mean cosine has the bits of 2.
+    key.push(match phase {
+        Phase::Isotropic => 2.0_f64.to_bits(),
+        Phase::HenyeyGreenstein { g } => g.to_bits(),
+    });
+    key
 }
 
 /// Each boundary with those around it and those that it crosses.
