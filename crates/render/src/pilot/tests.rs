@@ -113,7 +113,8 @@ fn images_are_those_of_any_method() {
         let choice: Choice = auto.choice().expect("a pilot chose").clone();
         assert_eq!(choice.method, auto.method().name());
         assert!(choice.predicted <= choice.predicted_none && choice.predicted > 0.0, "{choice:?}");
-        assert!(!choice.measured.is_empty(), "{choice:?}");
+        // Which is tried depends on the machine.
+        assert!(choice.measured.len() + choice.declined.len() > 0, "{choice:?}");
         let images = [&plain, &auto].map(|p| p.render(&render, &Quiet).expect("it is rendered"));
         assert!(images[0].image == images[1].image, "{name}");
         assert_eq!(images[1].statistics.choice.as_ref(), Some(&choice));
