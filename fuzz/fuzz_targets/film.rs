@@ -34,7 +34,8 @@ fuzz_target!(|bytes: &[u8]| {
     // A crop of many pixels takes memory once it is developed, which is no fault.
     if u64::from(crop.x1 - crop.x0) * u64::from(crop.y1 - crop.y0) < 1 << 20 {
         let so_far = film.develop_so_far().expect("a small image");
-        assert!(film.develop().is_ok_and(|image| image.pixels.len() == so_far.pixels.len()) || !film.missing(0..1).is_empty() || film.samples().len() != 1);
+        // The whole picture is the one so far, or it lacks samples.
+        assert!(film.develop().map_or(true, |image| image.pixels.len() == so_far.pixels.len()));
         film.develop_layers();
     }
 });

@@ -31,20 +31,21 @@ pub struct Counters {
     pub refused: u64,
 }
 
+/// Saturates, for the counts of a film may come from anywhere.
 impl std::ops::AddAssign for Counters {
     fn add_assign(&mut self, other: Self) {
-        self.queries += other.queries;
-        self.spatial += other.spatial;
-        self.proved += other.proved;
-        self.on_light += other.on_light;
-        self.on_light_proved += other.on_light_proved;
-        self.superficial_proved += other.superficial_proved;
-        self.proved_occluded += other.proved_occluded;
-        self.rays += other.rays;
-        self.flights += other.flights;
-        self.flights_proved += other.flights_proved;
-        self.lit_segments += other.lit_segments;
-        self.paths += other.paths;
-        self.refused += other.refused;
+        self.queries = self.queries.saturating_add(other.queries);
+        self.spatial = self.spatial.saturating_add(other.spatial);
+        self.proved = self.proved.saturating_add(other.proved);
+        self.on_light = self.on_light.saturating_add(other.on_light);
+        self.on_light_proved = self.on_light_proved.saturating_add(other.on_light_proved);
+        self.superficial_proved = self.superficial_proved.saturating_add(other.superficial_proved);
+        self.proved_occluded = self.proved_occluded.saturating_add(other.proved_occluded);
+        self.rays = self.rays.saturating_add(other.rays);
+        self.flights = self.flights.saturating_add(other.flights);
+        self.flights_proved = self.flights_proved.saturating_add(other.flights_proved);
+        self.lit_segments = self.lit_segments.saturating_add(other.lit_segments);
+        self.paths = self.paths.saturating_add(other.paths);
+        self.refused = self.refused.saturating_add(other.refused);
     }
 }
