@@ -13,15 +13,11 @@
 //! *Cost.* Each ray is cast to its end, where grey media cast only as far as it flies. `raymarch` and `volpath` look for light as the estimator `thesis` does, whichever is asked for.
 
 use glam::DVec3;
-use vdf_geometry::Segment;
 use vdf_scene::Rgb;
 use vdf_visibility::{Counters, Recorder};
 
-use super::{Path, Tracer, Vertex, volpath::Event};
-use crate::{
-    Sampler,
-    media::{FreeFlight, MediumIntervals},
-};
+use super::{Path, Tracer, Vertex, raymarch::Fog, volpath::Event};
+use crate::{Sampler, media::FreeFlight};
 
 impl<R: Recorder> Tracer<'_, R> {
     /// The first event on the path's ray, whose channel and free flight are drawn by a uniform number; the path gets its weight.
@@ -52,14 +48,12 @@ impl<R: Recorder> Tracer<'_, R> {
     /// what it scatters.
     pub(super) fn by_transmittances(
         &self,
-        free: &Segment,
-        direction: DVec3,
-        intervals: &MediumIntervals<'_>,
+        fog: &Fog<'_>,
         depths: DVec3,
-        samples: u32,
         sampler: &mut Sampler,
         counters: &mut Counters,
     ) -> Rgb {
+        let &Fog { free, direction, intervals, samples, .. } = fog;
         let scattered = (-depths).to_array().map(|d| -d.exp_m1());
         let all: f64 = scattered.iter().sum();
         let mut sum = Rgb::ZERO;
@@ -80,7 +74,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let FreeFlight::Collision { t, medium, regions } = &flight.end else { continue };
             let densities = flight.sigma_t * (-flight.depths).exp();
             let mean = densities.element_sum() / all;
-            if !(mean > 0.0) {
+            if mean <= 0.0 || mean.is_nan() {
                 continue;
             }
             let point = free.at(*t);

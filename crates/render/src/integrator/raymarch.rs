@@ -39,7 +39,7 @@ pub(super) struct Fog<'a> {
     pub(super) free: &'a Segment,
     pub(super) direction: DVec3,
     pub(super) intervals: &'a MediumIntervals<'a>,
-    /// The optical depth of all of it, positive.
+    /// The optical depth of all of it, the largest of all colours, positive.
     tau: f64,
     pub(super) samples: u32,
 }
@@ -54,10 +54,10 @@ impl<R: Recorder> Tracer<'_, R> {
             let intervals = self.world.media.intervals(&free, &path.ray.regions);
             if self.world.media.is_chromatic() {
                 let depths = intervals.optical_depths();
-                let direction = path.ray.direction;
-                if depths.max_element() > 0.0 && self.may_scatter(path.depth + 1) {
-                    let light =
-                        self.by_transmittances(&free, direction, &intervals, depths, samples, sampler, counters);
+                let tau = depths.max_element();
+                if tau > 0.0 && self.may_scatter(path.depth + 1) {
+                    let fog = Fog { free: &free, direction: path.ray.direction, intervals: &intervals, tau, samples };
+                    let light = self.by_transmittances(&fog, depths, sampler, counters);
                     path.radiance += path.throughput * light;
                 }
                 path.throughput *= (-depths).exp().as_vec3();

@@ -19,14 +19,14 @@ pub(crate) struct Heterogeneous {
 #[derive(Debug)]
 enum Local {
     Constant(DVec3),
-    Grid(Grid),
+    Grid(Box<Grid>),
 }
 
 impl Heterogeneous {
     pub(super) fn new(medium: &Medium) -> Self {
         let extinction = match &medium.sigma_t {
             Extinction::Constant(sigma_t) => Local::Constant(*sigma_t),
-            Extinction::Grid { volume, scale } => Local::Grid(Grid::new(volume, *scale)),
+            Extinction::Grid { volume, scale } => Local::Grid(Box::new(Grid::new(volume, *scale))),
         };
         Self { extinction, albedo: medium.albedo.clone(), phase: medium.phase }
     }

@@ -137,6 +137,8 @@ fn what_is_wrong_is_said_with_its_place() {
     refused(&sigma_t("none.vol", ""), 71, "cannot read \"none.vol\"");
     refused(&sigma_t("a.vol", "<string name='wrap_mode' value='border'/>"), 110, "wrap_mode \"border\"");
     refused(&sigma_t("flat.vol", "<boolean name='use_grid_bbox' value='true'/>"), 113, "has no volume");
+    let sheared = "<string name='wrap_mode' value='repeat'/><transform name='to_world'><matrix value='1 1e9 0 0 0 1 0 0 0 0 1 0 0 0 0 1'/></transform>";
+    refused(&sigma_t("a.vol", sheared), 151, "too many copies");
     refused(&heterogeneous("<volume type='gridvolume' name='sigma_t'/>"), 30, "no filename");
     refused(&sigma_t("a.vol", "<integer name='oops' value='1'/>"), 110, "no property \"oops\"");
     refused(&heterogeneous("<volume type='sdfgrid' name='sigma_t'/>"), 38, "supported: gridvolume, constvolume");

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Vec3};
+use vdf_geometry::Bounds;
 
 use super::document::{Element, Place};
 use super::properties::Object;
@@ -16,6 +17,9 @@ use crate::{Albedo, Extinction, GridVolume, SceneError, VolumeFilter, VoxelGrid,
 const MAX_NUMBERS: u64 = 1 << 30;
 /// And their files at most this many bytes.
 const MAX_FILE_BYTES: u64 = 8 << 30;
+
+/// Where a turned volume repeats itself up to its box, it has at most this many voxels with all copies.
+const MAX_REPEATED: f64 = (1_u64 << 34) as f64;
 
 /// The grids that were read, by their path.
 pub(super) type Grids = HashMap<PathBuf, Arc<VoxelGrid>>;
@@ -73,7 +77,23 @@ fn grid<'a>(loader: &Loader<'a>, object: &mut Object<'a>, grid_from_world: DMat4
     if !(grid_from_world.is_finite() && grid_from_world.inverse().is_finite()) {
         return Err(object.place_of("to_world").error("the transform of the volume overflows", "use a smaller scale"));
     }
-    Ok(GridVolume { grid, filter, wrap, grid_from_world })
+    let volume = GridVolume { grid, filter, wrap, grid_from_world };
+    if wrap != Wrap::Clamp && reach(&volume) > MAX_REPEATED {
+        let help = "write wrap_mode=clamp, or distort the volume less";
+        return Err(object.place_of("to_world").error("the box around the volume holds too many copies of it", help));
+    }
+    Ok(volume)
+}
+
+/// How many voxels there are in the box around a volume in the world, with all copies of it.
+fn reach(volume: &GridVolume) -> f64 {
+    let Bounds { min, max } = volume.world_bounds();
+    let corners = (0..8_u8).map(|i| {
+        let pick = |bit: u8, axis: usize| if i & bit == 0 { min[axis] } else { max[axis] };
+        volume.grid_from_world.transform_point3(DVec3::new(pick(1, 0), pick(2, 1), pick(4, 2)))
+    });
+    let size = DVec3::from_array(volume.grid.size().map(f64::from));
+    (Bounds::of_points(corners).extent() * size + 8.0).element_product()
 }
 
 /// The grid in a file.

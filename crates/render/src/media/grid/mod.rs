@@ -246,25 +246,24 @@ fn cells(
     bounds: &Bounds,
 ) -> ([i64; 3], [i64; 3]) {
     let trilinear = filter == VolumeFilter::Trilinear;
-    let (mut first, mut count) = ([0; 3], [0; 3]);
     let corners = (0..8_u8).map(|i| {
         let pick = |bit: u8, axis: usize| if i & bit == 0 { bounds.min[axis] } else { bounds.max[axis] };
         values_from_world.transform_point3(dvec3(pick(1, 0), pick(2, 1), pick(4, 2)))
     });
     let reached = Bounds::of_points(corners);
-    for axis in 0..3 {
+    let range = |axis: usize| {
         let n = i64::from(size[axis]);
         let (least, last) = if trilinear { (-1, n - 1) } else { (0, n - 1) };
-        let (low, high) = match wrap {
+        match wrap {
             // Beyond the border nothing changes any more.
-            Wrap::Clamp => (least, last),
+            Wrap::Clamp => [least, last],
             // Rounding on the faces of the cube itself must not add a row.
             Wrap::Repeat | Wrap::Mirror => {
                 let (low, high) = (reached.min[axis] + 1e-6, reached.max[axis] - 1e-6);
-                ((low.floor() as i64).min(least), (high.floor() as i64).max(last))
+                [(low.floor() as i64).min(least), (high.floor() as i64).max(last)]
             }
-        };
-        (first[axis], count[axis]) = (low, (high - low + 1).max(1));
-    }
-    (first, count)
+        }
+    };
+    let ranges = [0, 1, 2].map(range);
+    (ranges.map(|[first, _]| first), ranges.map(|[first, last]| last - first + 1))
 }

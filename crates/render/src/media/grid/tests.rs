@@ -60,8 +60,7 @@ fn placements(u: &mut Sampler) -> [DMat4; 6] {
 fn segment(size: [u32; 3], i: u32, u: &mut Sampler) -> Segment {
     let mut place = |far: bool| {
         let mut p = DVec3::ZERO;
-        for k in 0..3 {
-            let n = f64::from(size[k]);
+        for (k, n) in size.into_iter().map(f64::from).enumerate() {
             let lattice = ((u.next_1d() * (2.0 * n + 1.0)).floor() - 0.0) * 0.5 / n;
             p[k] = match (u.next_1d() * 8.0) as u32 {
                 0 => lattice,
@@ -300,13 +299,13 @@ fn channels_are_each_by_itself() {
             let s = Segment::new(world_from_grid.transform_point3(s.p), world_from_grid.transform_point3(s.q));
             let length = s.length();
             let depths = all.optical_depth::<3>(&s, [0.0, 1.0], length);
-            for c in 0..3 {
-                assert_eq!(depths[c], depth_of(&single[c], &s, [0.0, 1.0], length), "{s:?}");
+            for (c, alone) in single.iter().enumerate() {
+                assert_eq!(depths[c], depth_of(alone, &s, [0.0, 1.0], length), "{s:?}");
                 let tau = 0.7 * depths[c];
                 let Ok(reached) = all.distance::<3>(&s, [0.0, 1.0], length, tau, c) else { continue };
-                assert_eq!(Ok(reached.t), distance_of(&single[c], &s, [0.0, 1.0], length, tau), "{s:?}");
-                for k in 0..3 {
-                    let depth = depth_of(&single[k], &s, [0.0, reached.t], length);
+                assert_eq!(Ok(reached.t), distance_of(alone, &s, [0.0, 1.0], length, tau), "{s:?}");
+                for (k, alone) in single.iter().enumerate() {
+                    let depth = depth_of(alone, &s, [0.0, reached.t], length);
                     let bound = 1e-12 * (1.0 + depths[k]) + 1e-13 * s.p.abs().max(s.q.abs()).max_element();
                     assert!((reached.depth[k] - depth).abs() <= bound, "{s:?}: {} not {depth}", reached.depth[k]);
                 }

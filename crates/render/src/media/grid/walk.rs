@@ -79,13 +79,9 @@ impl<'g> Ray<'g> {
             return None;
         }
         let origin = origin.to_array().map(|x| x.clamp(-FARTHEST, FARTHEST));
-        let (mut rate, mut inverse) = (rate.to_array(), [0.0; 3]);
-        for axis in 0..3 {
-            inverse[axis] = rate[axis].recip();
-            if !inverse[axis].is_finite() {
-                (rate[axis], inverse[axis]) = (0.0, 0.0);
-            }
-        }
+        let moves = |rate: f64| rate.recip().is_finite();
+        let rate = rate.to_array().map(|r| if moves(r) { r } else { 0.0 });
+        let inverse = rate.map(|r| if moves(r) { r.recip() } else { 0.0 });
         Some(Self { grid, begin, end: end - begin, origin, rate, inverse })
     }
 
