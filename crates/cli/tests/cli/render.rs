@@ -68,7 +68,8 @@ fn a_pilot_chooses_the_method() {
     let sandbox = Sandbox::new();
     let run = |method: &str, exr: &str| {
         let size = ["-D", "width=40", "-D", "height=40", "--spp", "16", "--reproducible", "--stats", "fog.json"];
-        let outcome = sandbox.run(&[&["render", "--method", method, "-o", exr], &size[..]].concat()).succeeded();
+        let outcome = sandbox.run(&[&["render", "--method", method, "-o", exr], &size[..]].concat());
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
         let json: serde_json::Value = serde_json::from_slice(&sandbox.read("fog.json")).unwrap();
         (outcome, json)
     };
