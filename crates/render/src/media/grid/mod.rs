@@ -12,7 +12,7 @@
 //!
 //! *Guarantee.* Depths grow with the interval. An answer does not depend on whether empty space is skipped, to the last bit (`tests.rs`). Errors: `docs/numerics.md`.
 //!
-//! *Cost.* A few nanoseconds a cell that is not skipped; one byte a brick. Figures, and why no tracking by majorants: `docs/performance.md`.
+//! *Cost.* An interpolation at two places for each cell that is not skipped; one byte a brick. Figures: `docs/performance.md`; why no tracking by majorants: `docs/ARCHITECTURE.md`.
 
 mod bricks;
 #[cfg(test)]
