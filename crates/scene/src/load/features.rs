@@ -51,12 +51,8 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
 pub(super) fn unsupported(element: &Element, kind: &str, kinds: &[&str]) -> SceneError {
     let at = element.attribute("type").map_or(&element.at, |a| &a.at);
     let (tag, mut help) = (&element.tag, names::suggest(kind, kinds));
-    match (tag.as_str(), kind) {
-        ("film", "specfilm") => {
-            help =
-                "it records a spectrum, and vdf renders red, green and blue: write <film type=\"hdrfilm\">".to_owned();
-        }
-        _ => {}
+    if (tag.as_str(), kind) == ("film", "specfilm") {
+        help = "it records a spectrum, and vdf renders red, green and blue: write <film type=\"hdrfilm\">".to_owned();
     }
     at.error(format!("{tag} type \"{kind}\" is not supported"), help)
 }
