@@ -35,6 +35,7 @@ use self::{heterogeneous::Heterogeneous, intervals::DepthLeft, regions::Regions}
 pub struct Media {
     media: Vec<Substance>,
     is_chromatic: bool,
+    least_sigma_t: f64,
     regions: Regions,
     /// The regions that the camera is inside of.
     at_camera: RegionSet,
@@ -93,7 +94,13 @@ impl Media {
         let regions = Regions::new(media, boundaries, ambient);
         let media: Vec<_> = media.iter().map(Substance::new).collect();
         let is_chromatic = media.iter().any(|m| matches!(m, Substance::Heterogeneous(m) if m.is_chromatic()));
-        Self { media, is_chromatic, regions, at_camera: RegionSet::default() }
+        // Once, for a grid takes a look at all of its values.
+        let typical = |m: &Substance| match m {
+            Substance::Homogeneous(m) => m.sigma_t,
+            Substance::Heterogeneous(m) => m.typical(),
+        };
+        let least_sigma_t = media.iter().map(typical).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min);
+        Self { media, is_chromatic, least_sigma_t, regions, at_camera: RegionSet::default() }
     }
 
     /// Prepares the media of a scene. The ambient medium is the sensor's if the camera is outside of all boundaries, else what the outermost
@@ -126,12 +133,8 @@ impl Media {
     /// The least extinction coefficient of a medium that takes something away, of one that changes in space a typical one; infinite if none does.
     #[inline]
     #[must_use]
-    pub fn least_sigma_t(&self) -> f64 {
-        let typical = |m: &Substance| match m {
-            Substance::Homogeneous(m) => m.sigma_t,
-            Substance::Heterogeneous(m) => m.typical(),
-        };
-        self.media.iter().map(typical).filter(|&s| s > 0.0).fold(f64::INFINITY, f64::min)
+    pub const fn least_sigma_t(&self) -> f64 {
+        self.least_sigma_t
     }
 
     /// The medium of a point in these regions, that of the innermost; `None` is vacuum.
