@@ -10,13 +10,13 @@ use vdf::{
         SamplerKind, TransmittanceEstimator,
     },
     scene::{
-        Boundary, ComponentFormat, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId, Phase, PixelRect,
-        Projection, ReconstructionFilter, Rgb, Scene, Sensor,
+        Boundary, Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId,
+        Phase, PixelRect, Projection, ReconstructionFilter, Rgb, Scene, Sensor, Surface,
     },
     visibility::Method,
 };
 
-use glam::{DMat4, DVec3, Vec3, vec3};
+use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
 
 /// How to prepare a scene and how to render it, for tests that are about both.
 #[derive(Clone, Debug)]
@@ -136,6 +136,23 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Vec<Triangle> {
             [Triangle::new(a, b, c), Triangle::new(a, c, d)]
         })
         .collect()
+}
+
+/// A black block between the camera and the fog behind it, and a light of each kind: an area, a point and the surroundings.
+pub fn add_block_and_lights(scene: &mut Scene) {
+    let black = |triangles, radiance| Surface {
+        triangles,
+        bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
+        radiance,
+        ..Surface::default()
+    };
+    scene.surfaces.push(black(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
+    let light = Triangle::new(vec3(-1.2, 1.9, 1.2), vec3(0.8, 1.9, 1.2), vec3(0.8, 1.9, 2.4));
+    let lamp = scene.surfaces.len();
+    scene.surfaces.push(black(vec![light], Some(Rgb::splat(2.0))));
+    scene.emitters.push(Emitter::Area { surface: lamp });
+    scene.emitters.push(Emitter::Point { position: dvec3(2.6, 1.2, 0.6), intensity: Rgb::splat(5.0) });
+    scene.emitters.push(Emitter::Constant { radiance: Rgb::splat(0.3) });
 }
 
 /// Fills the box from `min` to `max` with a medium, vacuum outside.

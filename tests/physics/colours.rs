@@ -4,17 +4,16 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
 use vdf::{
-    geometry::Triangle,
     render::{Estimator, Integrator},
     scene::{
-        Bsdf, Emitter, Extinction, GridVolume, IntegratorSettings, Medium, MediumId, Phase, Rgb, Scene, Surface,
-        VolumeFilter, VoxelGrid, Wrap,
+        Emitter, Extinction, GridVolume, IntegratorSettings, Medium, MediumId, Phase, Rgb, Scene, VolumeFilter,
+        VoxelGrid, Wrap,
     },
 };
 
 use crate::{
     check::{RAYMARCH, VOLPATH, WAYS},
-    common::{Options, add_fog, cuboid, empty_scene, options, rendered},
+    common::{Options, add_block_and_lights, add_fog, empty_scene, options, rendered},
 };
 
 const BOX: [Vec3; 2] = [vec3(-1.5, -1.0, 1.0), vec3(1.0, 2.0, 3.5)];
@@ -117,18 +116,7 @@ fn all_ways_find_the_same_colours() {
             with_fog(&mut scene, coloured_grid(place), 0.7, place);
         }
         with_fog(&mut scene, 0.3.into(), 0.8, [vec3(-1.0, -2.0, 4.5), vec3(2.5, 1.0, 6.0)]);
-        let black = |triangles, radiance| Surface {
-            triangles,
-            bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
-            radiance,
-            ..Surface::default()
-        };
-        scene.surfaces.push(black(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
-        let lamp = Triangle::new(vec3(-1.2, 1.9, 1.2), vec3(0.8, 1.9, 1.2), vec3(0.8, 1.9, 2.4));
-        scene.surfaces.push(black(vec![lamp], Some(Rgb::splat(2.0))));
-        scene.emitters.push(Emitter::Area { surface: 1 });
-        scene.emitters.push(Emitter::Point { position: dvec3(2.6, 1.2, 0.6), intensity: Rgb::splat(5.0) });
-        scene.emitters.push(Emitter::Constant { radiance: Rgb::splat(0.3) });
+        add_block_and_lights(&mut scene);
         scene
     };
     let compare = |case: &str, a: &[Rgb], b: &[Rgb], channels: &[usize]| {

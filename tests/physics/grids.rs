@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Vec3, dvec3, vec3};
 use vdf::{
-    geometry::{Segment, Triangle},
+    geometry::Segment,
     render::{Estimator, FreeFlight, Media, Sampler},
     scene::{
-        Albedo, Boundary, Bsdf, Emitter, Extinction, GridVolume, IntegratorSettings, Medium, MediumId, Phase, Rgb,
-        Scene, Surface, VolumeFilter, VoxelGrid, Wrap,
+        Albedo, Boundary, Emitter, Extinction, GridVolume, IntegratorSettings, Medium, MediumId, Phase, Rgb, Scene,
+        VolumeFilter, VoxelGrid, Wrap,
     },
 };
 
 use crate::{
     check::{Check, RAYMARCH, TRACED, VOLPATH, WAYS},
-    common::{Options, add_fog, cuboid, empty_scene, options, rendered},
+    common::{Options, add_block_and_lights, add_fog, cuboid, empty_scene, options, rendered},
 };
 
 /// A grid over the box from `min` to `max`.
@@ -152,18 +152,7 @@ fn all_ways_find_the_same_light() {
     scene.media[0].albedo = Albedo::Grid(tint);
     scene.media.push(Medium::new(0.3, Rgb::splat(0.8), Phase::Isotropic));
     add_fog(&mut scene, vec3(-1.0, -2.0, 4.5), vec3(2.5, 1.0, 6.0), MediumId(2));
-    let black = |triangles, radiance| Surface {
-        triangles,
-        bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
-        radiance,
-        ..Surface::default()
-    };
-    scene.surfaces.push(black(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
-    let lamp = Triangle::new(vec3(-1.2, 1.9, 1.2), vec3(0.8, 1.9, 1.2), vec3(0.8, 1.9, 2.4));
-    scene.surfaces.push(black(vec![lamp], Some(Rgb::splat(2.0))));
-    scene.emitters.push(Emitter::Area { surface: 1 });
-    scene.emitters.push(Emitter::Point { position: dvec3(2.6, 1.2, 0.6), intensity: Rgb::splat(5.0) });
-    scene.emitters.push(Emitter::Constant { radiance: Rgb::splat(0.3) });
+    add_block_and_lights(&mut scene);
     let image = |(integrator, estimator), spp, seed| {
         let o = Options { integrator, estimator, spp: Some(spp), seed: Some(seed), ..options() };
         rendered(&scene, &o).image.pixels

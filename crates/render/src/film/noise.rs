@@ -178,20 +178,9 @@ mod tests {
     /// Two tiles, one pixel wide the second.
     fn film(limit: f64) -> Film {
         let origin = FilmOrigin {
-            version: "1".to_owned(),
-            scene: 1,
-            integrator: "volpath".to_owned(),
-            transmittance: "analytic".to_owned(),
-            roulette: "standard".to_owned(),
-            estimator: "thesis".to_owned(),
-            sampler: "independent".to_owned(),
-            seed: 0,
-            full_size: [17, 16],
-            crop: vdf_scene::PixelRect { x0: 0, y0: 0, x1: 17, y1: 16 },
             layers: layers_of_noise().with([Layer::Albedo].into_iter().collect()),
-            method: None,
-            spp: 1000,
             noise: Some(limit.try_into().unwrap()),
+            ..FilmOrigin::example([17, 16], 1000)
         };
         Film::new(origin, Picture::default()).unwrap()
     }

@@ -40,6 +40,27 @@ pub struct FilmOrigin {
 }
 
 impl FilmOrigin {
+    /// Of a film of this size without layers, for tests.
+    #[cfg(test)]
+    pub(super) fn example([width, height]: [u32; 2], spp: u32) -> Self {
+        Self {
+            version: "1".to_owned(),
+            scene: 1,
+            integrator: "volpath".to_owned(),
+            transmittance: "analytic".to_owned(),
+            roulette: "standard".to_owned(),
+            estimator: "thesis".to_owned(),
+            sampler: "independent".to_owned(),
+            seed: 0,
+            full_size: [width, height],
+            crop: PixelRect { x0: 0, y0: 0, x1: width, y1: height },
+            layers: Layers::default(),
+            method: None,
+            spp,
+            noise: None,
+        }
+    }
+
     /// Numbers that are kept of each pixel and block.
     pub(super) fn sums_per_pixel(&self) -> usize {
         self.layers.count()

@@ -10,22 +10,7 @@ const WIDTH: u32 = 17;
 const PIXELS: usize = WIDTH as usize;
 
 fn origin(seed: u64) -> FilmOrigin {
-    FilmOrigin {
-        version: "1".to_owned(),
-        scene: 1,
-        integrator: "volpath".to_owned(),
-        transmittance: "analytic".to_owned(),
-        roulette: "standard".to_owned(),
-        estimator: "thesis".to_owned(),
-        sampler: "independent".to_owned(),
-        seed,
-        full_size: [WIDTH, 1],
-        crop: PixelRect { x0: 0, y0: 0, x1: WIDTH, y1: 1 },
-        layers: Layers::default(),
-        method: None,
-        spp: 70,
-        noise: None,
-    }
+    FilmOrigin { seed, ..FilmOrigin::example([WIDTH, 1], 70) }
 }
 
 /// Values whose sums depend on the order: of very different sizes.

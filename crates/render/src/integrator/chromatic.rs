@@ -32,16 +32,7 @@ impl<R: Recorder> Tracer<'_, R> {
         let gain = if mean > 0.0 { densities / mean } else { DVec3::ZERO };
         path.throughput *= gain.as_vec3();
         path.worth *= gain;
-        match flight.end {
-            FreeFlight::Collision { t, medium, regions } => {
-                self.crosses_to(path, &regions);
-                Event::Collision { point: free.at(t), medium, regions }
-            }
-            FreeFlight::Passed(regions) => {
-                self.crosses_to(path, &regions);
-                Event::Arrival { surface, regions }
-            }
-        }
+        self.end_of_flight(path, flight.end, &free, surface)
     }
 
     /// Emitted light scattered once into a ray of these optical depths, from distances drawn by the transmittance of all channels: one of them with a probability in proportion to

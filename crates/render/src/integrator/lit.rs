@@ -1,9 +1,9 @@
 //! Single scattering of point lights from the parts of a ray that they see, and from nowhere else.
 //!
 //! *Idea.* [`LitIntervals`] say where a ray is lit. Distances are drawn only there, by their angle at the light and by what comes through
-//! (`equiangular.rs`). So in thin fog a sample is worth what the whole line is worth, whatever number it is drawn with, and it asks no query.
+//! (`equiangular`). So in thin fog a sample is worth what the whole line is worth, whatever number it is drawn with, and it asks no query.
 //!
-//! *Definition.* The pieces of a ray are its stretches of fog but for what is dark. With g the polygon of `equiangular.rs` over them, a distance
+//! *Definition.* The pieces of a ray are its stretches of fog but for what is dark. With g the polygon of `equiangular` over them, a distance
 //! is drawn with the density p₁ ∝ g D/r². Where g may be far from what it stands for, a share of [`DEFENSIVE`] is drawn by transmittance instead,
 //! p₂ ∝ σ_t exp(−τ) over the same pieces, and weighted by the balance heuristic in its one-sample form \[Veach1997\]. g is close if between any two of its
 //! nodes what it stands for changes by no more than [`CLOSE`] times: transmittance and phase function are monotone along a ray, so the
@@ -22,8 +22,9 @@ use vdf_visibility::{Answer, Counters, LitIntervals, QueryKind, Recorder, Shadow
 
 use super::{
     Tracer, Vertex,
-    equiangular::{Equiangular, LightPlace, Stretch},
+    equiangular::{Equiangular, LightPlace},
     raymarch::Fog,
+    stretch::Stretch,
     to_f32,
 };
 use crate::Sampler;

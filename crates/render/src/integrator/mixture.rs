@@ -2,7 +2,7 @@
 //!
 //! *Distances.* A ray that passes a point light within a mean free path, of the thinnest medium, is drawn by a mixture: a share of
 //! β(1 − T) of such rays, T their transmittance, ends in a collision whose distance is drawn by its angle at the light
-//! (`equiangular.rs`); the others fly freely. The density of a collision is that of the mixture, so its weight is at most
+//! (`equiangular`); the others fly freely. The density of a collision is that of the mixture, so its weight is at most
 //! 1/(1 − β); a ray that arrives at its end is worth 1/(1 − β(1 − T)). Rays that come no nearer fly freely: r² hardly changes along
 //! their flights. Next-event estimation asks for the same emitter. Area lights have no such peak, and gained nothing (`performance.md`).
 //!
@@ -25,8 +25,10 @@ use vdf_visibility::{Counters, Recorder};
 
 use super::{
     Origin, Path, PathRay, Tracer, Vertex, choose,
-    equiangular::{Equiangular, LightPlace, distance_at_depth, stretches},
-    power_heuristic, to_f32,
+    equiangular::{Equiangular, LightPlace},
+    power_heuristic,
+    stretch::{distance_at_depth, stretches},
+    to_f32,
     volpath::Event,
 };
 use crate::{

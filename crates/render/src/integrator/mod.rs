@@ -6,6 +6,7 @@ mod kind;
 mod lit;
 mod mixture;
 mod raymarch;
+mod stretch;
 mod surfaces;
 mod volpath;
 

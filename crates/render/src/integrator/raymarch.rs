@@ -4,7 +4,7 @@
 //! light only; surfaces scatter any number of times. With T the transmittance of the ray, the k-th of n samples lies at the optical
 //! depth −ln(1 − (k + ξ)(1 − T)/n) and is worth albedo·(1 − T)/n.
 //!
-//! That is the estimator `thesis`. `equiangular` draws distances by their angle at a light, too (`equiangular.rs`). The emitter is drawn first, with
+//! That is the estimator `thesis`. `equiangular` draws distances by their angle at a light, too (`equiangular`). The emitter is drawn first, with
 //! a place on it; then the distance, with a share of ¾ towards that place and else in proportion to transmittance; the one is weighted
 //! against the other by the balance heuristic in its one-sample form \[Veach1997\], with the density of the mixture. So a sample is never
 //! worth more than four times what it is by transmittance alone, in fog of any thickness, with a light in any place. One number in (k + ξ)/n
@@ -20,7 +20,8 @@ use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
 
 use super::{
     Aim, Path, PathRay, Tracer, Vertex, choose,
-    equiangular::{Equiangular, LightPlace, Stretch, distance_at_depth, stretches},
+    equiangular::{Equiangular, LightPlace},
+    stretch::{Stretch, distance_at_depth, stretches},
     to_f32,
 };
 use crate::{

@@ -101,7 +101,20 @@ impl<R: Recorder> Tracer<'_, R> {
         {
             return Event::Arrival { surface: None, regions: RegionSet::default() };
         }
-        match media.free_flight(&free, &ray.regions, tau) {
+        let flight = media.free_flight(&free, &ray.regions, tau);
+        self.end_of_flight(path, flight, &free, surface)
+    }
+
+    /// What a free flight through the way from the path's ray to what it meets ends with.
+    #[inline]
+    pub(super) fn end_of_flight(
+        &self,
+        path: &mut Path,
+        flight: FreeFlight,
+        free: &Segment,
+        surface: Option<SurfacePoint>,
+    ) -> Event {
+        match flight {
             FreeFlight::Collision { t, medium, regions } => {
                 self.crosses_to(path, &regions);
                 Event::Collision { point: free.at(t), medium, regions }
