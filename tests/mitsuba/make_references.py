@@ -73,7 +73,7 @@ PLAN = [
     Case("cbox_vol2", 8, 64, 128, BUILT_IN),
     Case("cbox_vol3", 8, 64, 128, BUILT_IN),
     Case("cbox_vol4", 8, 64, 256, BUILT_IN),
-    Case("cbox_vol6", 8, 64, 128, BUILT_IN),
+    Case("cbox_vol6", 8, 64, 512, BUILT_IN),
     Case("area_light", 2, 128, 256),
     Case("area_light", 8, 128, 256),
     Case("sky", 3, 128, 256),
