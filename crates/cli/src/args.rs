@@ -216,7 +216,7 @@ pub(crate) enum SceneCommand {
     /// Write a built-in scene with its meshes and volumes, to edit it or to load it in Mitsuba 3
     #[command(after_help = "Examples:
   vdf scene write cbox_vol2 my-scene                      a scene to start from
-  vdf scene write san-miguel court --triangles 10000000   a generated scene in another size (0.7 GB)
+  vdf scene write san-miguel court --triangles 1e7        a generated scene in another size (0.7 GB)
   vdf scene write smoke . --voxels 16777216               a grid of 256 × 256 × 256 (64 MB, half a minute)")]
     Write {
         /// Name of the scene
@@ -225,10 +225,10 @@ pub(crate) enum SceneCommand {
         #[arg(default_value = ".")]
         folder: PathBuf,
         /// About how many triangles a generated scene gets, from 100000 to 10000000
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", value_parser = parse_size)]
         triangles: Option<u32>,
         /// About how many voxels a generated volume gets, from 32768 to 100000000
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", value_parser = parse_size)]
         voxels: Option<u32>,
     },
 }
@@ -414,6 +414,11 @@ fn parse_count(text: &str) -> Result<u64, String> {
     count
         .filter(|n| *n <= 1_000_000_000_000_000)
         .ok_or_else(|| "expected a whole number of at most 1e15, such as 5000000 or 1e8".to_owned())
+}
+
+/// As [`parse_count`], of the parts of a scene.
+fn parse_size(text: &str) -> Result<u32, String> {
+    u32::try_from(parse_count(text)?).map_err(|_| format!("expected at most {}", u32::MAX))
 }
 
 fn parse_crop(text: &str) -> Result<PixelRect, String> {
