@@ -36,17 +36,21 @@ class Renderer(NamedTuple):
     name: str
     program: str  # "mitsuba" or "vdf"
     variant: str  # of Mitsuba, or method of vdf
-    transmittance: str  # towards emitters
+    way: str  # how vdf looks for light
 
     @property
     def other(self):
         return "vdf" if self.program == "mitsuba" else "mitsuba"
 
 
+# Mitsuba's volpath draws distances by the transmittance alone, decides by chance whether light arrives through the fog, and draws all numbers
+# independently. So does vdf in the way "alike"; the other is its default.
+WAYS = {"alike": "--transmittance analog --estimator thesis --sampler independent".split(), "default": []}
+
+
 def renderers(variants, methods):
-    # Mitsuba's volpath decides by chance whether light arrives through the fog: analog. Like with like is vdf with analog.
-    mitsuba = [Renderer(f"mitsuba {v}", "mitsuba", v, "analog") for v in variants]
-    return mitsuba + [Renderer(f"vdf {m}, {t}", "vdf", m, t) for t in ("analog", "analytic") for m in methods]
+    mitsuba = [Renderer(f"mitsuba {v}", "mitsuba", v, "") for v in variants]
+    return mitsuba + [Renderer(f"vdf {m}, {way}", "vdf", m, way) for way in WAYS for m in methods]
 
 
 class Job(NamedTuple):
@@ -99,7 +103,7 @@ def render(job, renderer, spp, seeds):
             stats = path.with_suffix(".json")
             defines = {"width": job.size, "height": job.size, "max_depth": job.max_depth, "rr_depth": job.rr_depth}
             whole += run(
-                [job.vdf, "render", job.scene, "--method", renderer.variant, "--transmittance", renderer.transmittance]
+                [job.vdf, "render", job.scene, "--method", renderer.variant, *WAYS[renderer.way]]
                 + ["--spp", str(spp), "--seed", str(seed), "-j", str(job.threads), "-q", "-o", path, "--stats", stats]
                 + [word for name, value in defines.items() for word in ("-D", f"{name}={value}")]
             )[0]
@@ -170,7 +174,7 @@ def compare(args, scene):
     references = {}
     for program, variant in (("mitsuba", args.variants[-1]), ("vdf", args.methods[-1])):
         say(f"reference by {program}, {len(long)} x {args.reference_spp} samples")
-        renderer = Renderer(f"reference {program}", program, variant, "analog" if program == "mitsuba" else "analytic")
+        renderer = Renderer(f"reference {program}", program, variant, "" if program == "mitsuba" else "default")
         references[program] = Reference(render(job, renderer, args.reference_spp, long)[0])
     m, v = references["mitsuba"], references["vdf"]
     bias, z, p = compared(m.means, v.means)
@@ -210,7 +214,7 @@ def compare(args, scene):
                 f["trimmed"].append(float(trimmed(errors)))
                 f["means"].append(float(image.mean()))
                 if r.program == "vdf":
-                    same = images.setdefault(r.transmittance, image)
+                    same = images.setdefault(r.way, image)
                     if not np.array_equal(same, image):
                         wrong.append(f"{scene.stem}: {r.name} does not give the image of {args.methods[0]}, {spp} samples, seed {seed}")
 
@@ -225,7 +229,7 @@ def compare(args, scene):
             {
                 "scene": scene.stem,
                 "renderer": r.name,
-                "transmittance": r.transmittance,
+                "way": r.way,
                 "spp": spp,
                 "whole_s": whole,
                 "render_s": rendering,
@@ -316,7 +320,7 @@ def main():
     parser.add_argument("--reference-spp", type=int, default=256, help="of one of the reference's renders")
     parser.add_argument("--reference-seeds", type=int, default=16, help="renders of a reference; at least 4")
     parser.add_argument("--variants", type=lambda t: t.split(","), default=["scalar_rgb", "llvm_ad_rgb"], help="of Mitsuba; the last makes its reference")
-    parser.add_argument("--methods", type=lambda t: t.split(","), default=["none", "amr-xsn"], help="of vdf; the last makes its reference")
+    parser.add_argument("--methods", type=lambda t: t.split(","), default=["none", "lb"], help="of vdf; the last makes its reference")
     parser.add_argument("--quiet", action="store_true", help="no progress")
     args = parser.parse_args()
     if args.seeds < 2 or args.reference_seeds < 4:
