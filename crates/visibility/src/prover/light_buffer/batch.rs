@@ -9,7 +9,11 @@
 use glam::DVec3;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{Answer, LightBuffer, Tag, compare, place::Direction};
+use super::{
+    Answer, LightBuffer, Tag, compare,
+    place::{Cube, Direction},
+    tables::View,
+};
 use crate::ShadowQuery;
 
 /// So many queries go through the stages together: a bit each.
@@ -58,16 +62,18 @@ impl WithSimd for Run<'_> {
 impl Run<'_> {
     #[inline(always)]
     fn answer<const WHOLE: bool>(self) -> usize {
-        let light = self.buffer.cube.light();
+        let (cube, view) = (&self.buffer.cube, self.buffer.tables.view());
         let mut places = Places::new();
         let mut done = 0;
         for (queries, answers) in self.queries.chunks(BLOCK).zip(self.answers.chunks_mut(BLOCK)) {
-            if !are_towards(queries, self.emitter, light) {
+            if !are_towards(queries, self.emitter, cube.light()) {
                 break;
             }
-            places.find::<WHOLE>(self.buffer, queries);
-            let open = places.compare(self.buffer, answers);
-            self.buffer.test_open(&places, open, queries, answers);
+            places.find::<WHOLE>(cube, queries);
+            let open = places.compare(&view, answers);
+            if open != 0 {
+                self.buffer.test_open(&view, &places, open, queries, answers);
+            }
             done += queries.len();
         }
         done
@@ -122,20 +128,20 @@ impl Places {
 
     /// The places of these queries.
     #[inline(always)]
-    fn find<const WHOLE: bool>(&mut self, buffer: &LightBuffer, queries: &[ShadowQuery]) {
+    fn find<const WHOLE: bool>(&mut self, cube: &Cube, queries: &[ShadowQuery]) {
         let n = queries.len().min(BLOCK);
         let queries = &queries[..n];
         let [x, y, z] = &mut self.x;
         let (dx, dy, dz) = (&mut x[..n], &mut y[..n], &mut z[..n]);
         // By themselves, for a loop that holds numbers of double precision is made of vectors of half as many lanes.
         for i in 0..n {
-            [dx[i], dy[i], dz[i]] = buffer.cube.difference(queries[i].from);
+            [dx[i], dy[i], dz[i]] = cube.difference(queries[i].from);
         }
         let n = lanes(n);
         let (x, y, z, w) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut self.w[..n]);
         let (texel, code) = (&mut self.texel[..n], &mut self.code[..n]);
         for i in 0..n {
-            let place = buffer.cube.place_of::<WHOLE>([x[i], y[i], z[i]]);
+            let place = cube.place_of::<WHOLE>([x[i], y[i], z[i]]);
             [x[i], y[i], z[i]] = place.direction.x;
             w[i] = place.direction.w;
             texel[i] = place.texel;
@@ -145,20 +151,21 @@ impl Places {
 
     /// The answers by comparisons alone, and a bit for each that they leave open.
     #[inline(always)]
-    fn compare(&self, buffer: &LightBuffer, answers: &mut [Answer]) -> u32 {
+    fn compare(&self, view: &View<'_>, answers: &mut [Answer]) -> u32 {
         let n = lanes(answers.len());
         let mut depths = [0; BLOCK];
         let (loaded, _) = depths[..n].as_chunks_mut::<LANES>();
         let (texels, _) = self.texel[..n].as_chunks::<LANES>();
         for (depths, texels) in loaded.iter_mut().zip(texels) {
             for i in 0..LANES {
-                depths[i] = buffer.texels[texels[i] as usize].depths;
+                depths[i] = view.texel(texels[i] as usize).depths;
             }
         }
         let (mut found, mut is_open) = ([Answer::Unknown; BLOCK], [false; BLOCK]);
         for i in 0..n {
             let (lit, open) = compare(self.code[i], depths[i]);
-            found[i] = Answer::of(!lit);
+            // Those that are left open are so until a triangle blocks their way.
+            found[i] = Answer::of(!(lit | open));
             is_open[i] = open;
         }
         let count = answers.len().min(BLOCK);
@@ -177,38 +184,47 @@ impl Places {
 impl LightBuffer {
     /// Answers those of a block that comparisons leave open, which have a bit in `open`.
     #[inline(always)]
-    fn test_open(&self, places: &Places, mut open: u32, queries: &[ShadowQuery], answers: &mut [Answer]) {
-        if open == 0 {
-            return;
-        }
-        // What waits, in the order of the queries: whose it is, what it waits for, the record that it waits for first.
-        let (mut lane, mut tag, mut record) = ([0_u32; BLOCK], [0_u32; BLOCK], [0_u32; BLOCK]);
+    fn test_open(
+        &self,
+        view: &View<'_>,
+        places: &Places,
+        mut open: u32,
+        queries: &[ShadowQuery],
+        answers: &mut [Answer],
+    ) {
+        // Who waits, in the order of the queries: whose it is, where in its list, the record that is next.
+        let (mut lane, mut entry, mut record) = ([0_u32; BLOCK], [0_u32; BLOCK], [0_u32; BLOCK]);
         let mut waiting = 0;
         while open != 0 {
             let i = open.trailing_zeros();
             open &= open - 1;
-            let waits_for = self.texels[places.texel[i as usize] as usize].tag;
-            // Not branches, which would be taken at random: who waits for no list reads the first entry, which belongs to none.
-            let entry = &self.entries[if waits_for.kind() == Tag::LIST { waits_for.number() } else { 0 }];
-            let single = waits_for.number() as u32;
-            let at = waiting % BLOCK;
-            (lane[at], tag[at]) = (i, waits_for.0);
-            record[at] = if waits_for.kind() == Tag::SINGLE { single } else { entry.triangle };
-            waiting += 1;
-        }
-        for ((&lane, &tag), &record) in lane.iter().zip(&tag).zip(&record).take(waiting) {
-            let (i, tag) = (lane as usize % BLOCK, Tag(tag));
+            let tag = view.texel(places.texel[i as usize] as usize).tag;
             if tag.kind() > Tag::SINGLE {
-                answers[i] = self.answer(queries[i].from);
+                answers[i as usize] = self.answer(queries[i as usize].from);
                 continue;
             }
-            let (d, direction) = (queries[i].from - self.cube.light(), places.direction(i));
-            let first: Answer = self.records[record as usize].test(d, &direction).into();
-            answers[i] = first;
-            if (tag.kind() == Tag::LIST) & (first != Answer::Occluded) && self.entries[tag.number()].last == 0 {
-                let rest = self.test_list(places.code[i], d, &direction, tag.number() + 1).answer;
-                answers[i] = if rest == Answer::Unoccluded { first } else { rest };
+            // A mask, not a branch, which would be taken at random: who waits for one triangle has the first entry as its list, which ends there.
+            let of_list = tag.kind().wrapping_sub(1);
+            let number = tag.number() as u32;
+            let at = waiting % BLOCK;
+            (lane[at], entry[at]) = (i, number & of_list);
+            record[at] = (view.entry((number & of_list) as usize).triangle & of_list) | (number & !of_list);
+            waiting += 1;
+        }
+        // One triangle for each of them, then the next for those that still wait.
+        while waiting > 0 {
+            let mut left = 0;
+            for at in 0..waiting.min(BLOCK) {
+                let (i, number) = (lane[at] as usize % BLOCK, entry[at] as usize);
+                let d = queries[i].from - self.cube.light();
+                let found: Answer = view.record(record[at]).test(d, &places.direction(i)).into();
+                answers[i] = if found == Answer::Unoccluded { answers[i] } else { found };
+                let next = view.entry(number + 1);
+                (lane[left], entry[left], record[left]) = (i as u32, number as u32 + 1, next.triangle);
+                let ends = (view.entry(number).last == 1) | (places.code[i] < u32::from(next.nearest));
+                left += usize::from(!(ends | (found == Answer::Occluded)));
             }
+            waiting = left;
         }
     }
 }

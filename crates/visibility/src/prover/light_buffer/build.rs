@@ -21,6 +21,7 @@ use super::{
     place::{self, Cube},
     record::Record,
     sheets,
+    tables::Tables,
 };
 
 /// Texels of a tile.
@@ -505,33 +506,36 @@ fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins,
         occurs[number as usize] = record;
     }
     let record_of = occurs;
-    let records = numbers
-        .par_iter()
-        .filter_map(|&number| Cone::new(&triangles[number as usize], cube.light()).map(|cone| Record::new(&cone)))
-        .collect();
     // Texels of no face, those of the tiles, all that are divided.
     let mut part = place::FIRST as usize + tiles.len() * TILE_TEXELS;
-    let mut texels = vec![Texel::EMPTY; part];
-    texels[place::UNKNOWN as usize] = Texel::UNKNOWN;
-    texels.reserve_exact(tiles.iter().map(|tile| tile.parts.len()).sum());
-    let mut entries = Vec::with_capacity(1 + tiles.iter().map(|tile| tile.entries.len()).sum::<usize>());
-    entries.push(Entry { triangle: 0, nearest: 0, last: 1 });
+    let all_parts = tiles.iter().map(|tile| tile.parts.len()).sum::<usize>();
+    let mut entry = 1;
+    // One more at the end: who reads an entry may read the next.
+    let all_entries = 1 + entry + tiles.iter().map(|tile| tile.entries.len()).sum::<usize>();
+    let mut tables = Tables::zeroed(part + all_parts, all_entries, numbers.len());
+    let mut view = tables.view_mut();
+    view.records().par_iter_mut().zip(&numbers).for_each(|(record, &number)| {
+        // Those that have no cone do not occur.
+        if let Some(cone) = Cone::new(&triangles[number as usize], cube.light()) {
+            *record = Record::new(&cone).0;
+        }
+    });
+    view.put_texels(0, (0..place::FIRST).map(|i| if i == place::UNKNOWN { Texel::UNKNOWN } else { Texel::EMPTY }));
+    view.put_entries(0, [Entry { triangle: 0, nearest: 0, last: 1 }].into_iter());
     let moved = |texel: &Texel, part, entry| Texel { tag: texel.tag.moved(&record_of, part, entry), ..*texel };
     for (number, tile) in tiles.iter().enumerate() {
         let (face, x, y) = bins.tile(number);
         let window = &windows[face.index()];
         // A tile's squares of texels are rows of eight, which are parts of the window's.
-        let row = (place::SQUARE * TILE) as usize;
-        for (j, squares) in (0..).zip(tile.texels.chunks(row)) {
+        for (j, squares) in (0..).zip(tile.texels.chunks((place::SQUARE * TILE) as usize)) {
             let first = place::in_window(x * TILE, y * TILE + j * place::SQUARE, window.side().ilog2());
-            let first = (window.first + first) as usize;
-            for (to, texel) in texels[first..first + row].iter_mut().zip(squares) {
-                *to = moved(texel, part, entries.len());
-            }
+            view.put_texels((window.first + first) as usize, squares.iter().map(|t| moved(t, part, entry)));
         }
-        texels.extend(tile.parts.iter().map(|t| moved(t, part, entries.len())));
+        view.put_texels(part, tile.parts.iter().map(|t| moved(t, part, entry)));
+        let of_all = |e: &Entry| Entry { triangle: record_of[e.triangle as usize], ..*e };
+        view.put_entries(entry, tile.entries.iter().map(of_all));
         part += tile.parts.len();
-        entries.extend(tile.entries.iter().map(|e| Entry { triangle: record_of[e.triangle as usize], ..*e }));
+        entry += tile.entries.len();
     }
-    LightBuffer { cube, texels, entries, records }
+    LightBuffer { cube, tables }
 }

@@ -25,6 +25,7 @@ mod frame;
 mod place;
 mod record;
 mod sheets;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -34,7 +35,8 @@ use self::{
     build::PARTS,
     frame::NEVER,
     place::{Cube, Direction, Place},
-    record::{Record, Verdict},
+    record::Verdict,
+    tables::{Tables, View},
 };
 use super::Answer;
 
@@ -42,11 +44,8 @@ use super::Answer;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightBuffer {
     cube: Cube,
-    /// Those of no face, face by face; then the parts of texels that are divided.
-    texels: Vec<Texel>,
-    /// Lists. The first entry belongs to none.
-    entries: Vec<Entry>,
-    records: Vec<Record>,
+    /// Texels of no face, those of the faces, then the parts of those that are divided; lists, of which the first and the last entry belong to none; records.
+    tables: Tables,
 }
 
 /// Why a light has no buffer.
@@ -103,6 +102,15 @@ impl Texel {
 
     const fn new(lit: u16, occluded: u16, tag: Tag) -> Self {
         Self { depths: (occluded as u32) << 16 | lit as u32, tag }
+    }
+
+    #[inline(always)]
+    const fn of([depths, tag]: [u32; 2]) -> Self {
+        Self { depths, tag: Tag(tag) }
+    }
+
+    const fn pair(self) -> [u32; 2] {
+        [self.depths, self.tag.0]
     }
 }
 
@@ -178,6 +186,18 @@ struct Entry {
     last: u16,
 }
 
+impl Entry {
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "the low half is the nearest")]
+    const fn of([triangle, more]: [u32; 2]) -> Self {
+        Self { triangle, nearest: more as u16, last: (more >> 16) as u16 }
+    }
+
+    const fn pair(self) -> [u32; 2] {
+        [self.triangle, (self.last as u32) << 16 | self.nearest as u32]
+    }
+}
+
 impl LightBuffer {
     /// Where the light is.
     #[must_use]
@@ -198,8 +218,8 @@ impl LightBuffer {
 
     /// Its memory in bytes.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.texels[..]) + size_of_val(&self.entries[..]) + size_of_val(&self.records[..])
+    pub const fn bytes(&self) -> usize {
+        self.tables.bytes()
     }
 
     /// What is known of the closed segment from `from` to the light. Never wrong.
@@ -214,19 +234,23 @@ impl LightBuffer {
     #[must_use]
     pub fn look_up(&self, from: DVec3) -> LookUp {
         let place = self.cube.place(from);
-        let texel = self.texels[place.texel as usize];
+        let texel = self.tables.texel(place.texel);
         let (lit, open) = compare(place.code, texel.depths);
         if open {
-            return self.test(&place, from - self.cube.light(), texel.tag);
+            return self.tables.view().test(&place, from - self.cube.light(), texel.tag);
         }
         LookUp { answer: Answer::of(!lit), tests: 0 }
     }
+}
 
+impl View<'_> {
     /// The answer by the triangles that may decide, for a difference `d` of point and light.
     #[inline]
     fn test(&self, place: &Place, d: DVec3, tag: Tag) -> LookUp {
         match tag.kind() {
-            Tag::SINGLE => LookUp { answer: self.records[tag.number()].test(d, &place.direction).into(), tests: 1 },
+            Tag::SINGLE => {
+                LookUp { answer: self.record(tag.number() as u32).test(d, &place.direction).into(), tests: 1 }
+            }
             Tag::LIST => self.test_list(place.code, d, &place.direction, tag.number()),
             Tag::PARTS => self.look_up_part(place, d, tag.number()),
             _ => LookUp { answer: Answer::Unknown, tests: 0 },
@@ -237,12 +261,13 @@ impl LightBuffer {
     #[inline]
     fn test_list(&self, code: u32, d: DVec3, direction: &Direction, first: usize) -> LookUp {
         let (mut tests, mut found) = (0, Verdict::Passes);
-        for entry in &self.entries[first..] {
+        for number in first.. {
+            let entry = self.entry(number);
             if code < u32::from(entry.nearest) {
                 break;
             }
             tests += 1;
-            match self.records[entry.triangle as usize].test(d, direction) {
+            match self.record(entry.triangle).test(d, direction) {
                 Verdict::Passes => {}
                 Verdict::Close => found = Verdict::Close,
                 Verdict::Blocks => {
@@ -267,7 +292,7 @@ impl LightBuffer {
             (part as usize, at * parts - part as f32)
         };
         let [(i, x), (j, y)] = place.at.map(part);
-        let texel = self.texels[first + j * PARTS as usize + i];
+        let texel = self.texel(first + j * PARTS as usize + i);
         let (lit, open) = compare(place.code, texel.depths);
         if open {
             return self.test(&Place { at: [x, y], ..*place }, d, texel.tag);

