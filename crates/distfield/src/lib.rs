@@ -28,6 +28,7 @@ mod validate;
 mod voxel_box;
 
 pub use amr::Amr;
+pub use bytes::Bytes;
 pub use dsz::Dsz;
 pub use dual::Dual;
 pub use error::FieldError;

@@ -28,6 +28,9 @@ use crate::{
 /// Queries between two looks whether to stop, at most. So few are asked without threads, which would take as long to start.
 const QUERIES_AT_ONCE: usize = 1 << 12;
 
+/// Points that are asked about together, light by light.
+const POINTS_AT_ONCE: usize = 256;
+
 /// Proofs that points see lights, for other programs.
 ///
 /// ``triangles``: float32 of shape (n, 3, 3), three vertices each, in world units. ``lights``: float64 of shape (m, 3).
@@ -236,19 +239,27 @@ impl PyVisibility {
         self.lit_segments.fetch_add(counters.lit_segments, Ordering::Relaxed);
     }
 
-    /// Answers all queries from some points to these lights, point by point.
+    /// Answers all queries from some points to these lights, point by point; asks them light by light, for light buffers answer many at once.
     fn ask(&self, lights: Range<usize>, points: &[f64], answers: &mut [bool]) -> Counters {
         let visibility = Visibility::new(&self.bvh, &self.provers);
         let mut counters = Counters::default();
-        let query = |(i, light): (usize, usize)| ShadowQuery {
-            from: point(points, i),
-            to: self.lights[light],
-            emitter: light,
-            kind: QueryKind::Spatial,
-        };
-        let all = (0..points.len() / 3).flat_map(|i| lights.clone().map(move |light| (i, light)));
-        let queries: Vec<ShadowQuery> = all.map(query).collect();
-        visibility.all_unoccluded(&queries, answers, &mut counters);
+        let mut queries = Vec::with_capacity(POINTS_AT_ONCE);
+        let mut unoccluded = [false; POINTS_AT_ONCE];
+        let together = points.chunks(3 * POINTS_AT_ONCE).zip(answers.chunks_mut(lights.len().max(1) * POINTS_AT_ONCE));
+        for (points, answers) in together {
+            for light in lights.clone() {
+                let to = self.lights[light];
+                let query = |i| ShadowQuery { from: point(points, i), to, emitter: light, kind: QueryKind::Spatial };
+                queries.clear();
+                queries.extend((0..points.len() / 3).map(query));
+                let unoccluded = &mut unoccluded[..queries.len()];
+                visibility.all_unoccluded(&queries, unoccluded, &mut counters);
+                let of_light = answers.iter_mut().skip(light - lights.start).step_by(lights.len());
+                for (answer, &unoccluded) in of_light.zip(&*unoccluded) {
+                    *answer = unoccluded;
+                }
+            }
+        }
         counters
     }
 

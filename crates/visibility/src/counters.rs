@@ -1,5 +1,7 @@
 //! How many queries were asked and how they were answered.
 
+use crate::{Answer, QueryKind, ShadowQuery};
+
 /// Counts of one thread or of a whole render.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
@@ -29,6 +31,55 @@ pub struct Counters {
     pub paths: u64,
     /// Paths whose radiance was not finite or negative and was therefore left out. Must be 0.
     pub refused: u64,
+}
+
+/// What one query adds to `spatial`, `proved`, `on_light`, `on_light_proved`, `superficial_proved` and `proved_occluded`.
+#[inline(always)]
+fn shares(kind: QueryKind, answer: Answer) -> [u8; 6] {
+    let known = answer != Answer::Unknown;
+    let of = |is: QueryKind| [u8::from(kind == is), u8::from((kind == is) & known)];
+    let ([spatial, proved], [on_light, on_light_proved]) = (of(QueryKind::Spatial), of(QueryKind::OnLight));
+    let [_, superficial_proved] = of(QueryKind::Superficial);
+    [spatial, proved, on_light, on_light_proved, superficial_proved, u8::from(answer == Answer::Occluded)]
+}
+
+impl Counters {
+    /// Counts a query with this answer of the provers.
+    #[inline(always)]
+    pub(crate) fn count(&mut self, kind: QueryKind, answer: Answer) {
+        self.add(1, shares(kind, answer));
+    }
+
+    /// Counts many.
+    pub(crate) fn count_all(&mut self, queries: &[ShadowQuery], answers: &[Answer]) {
+        // So many that no sum exceeds a byte: vectors hold sixteen of these.
+        const MANY: usize = 128;
+        for (queries, answers) in queries.chunks(MANY).zip(answers.chunks(MANY)) {
+            let mut kinds = [QueryKind::Spatial; MANY];
+            for (kind, query) in kinds.iter_mut().zip(queries) {
+                *kind = query.kind;
+            }
+            let mut sums = [0; 6];
+            for (kind, answer) in kinds.iter().zip(answers) {
+                for (sum, share) in sums.iter_mut().zip(shares(*kind, *answer)) {
+                    *sum += share;
+                }
+            }
+            self.add(queries.len(), sums);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, queries: usize, shares: [u8; 6]) {
+        let [spatial, proved, on_light, on_light_proved, superficial_proved, proved_occluded] = shares.map(u64::from);
+        self.queries += queries as u64;
+        self.spatial += spatial;
+        self.proved += proved;
+        self.on_light += on_light;
+        self.on_light_proved += on_light_proved;
+        self.superficial_proved += superficial_proved;
+        self.proved_occluded += proved_occluded;
+    }
 }
 
 /// Saturates, for the counts of a film may come from anywhere.

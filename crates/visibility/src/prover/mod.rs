@@ -11,7 +11,6 @@ pub use area::AreaNeighbourhood;
 pub(crate) use area::{Occluders, Site};
 pub(crate) use field::each_field;
 pub use field::{DistanceField, FieldProver};
-use light_buffer::LANES;
 pub use light_buffer::{LightBuffer, LookUp, Refusal};
 pub use provers::Provers;
 
@@ -27,6 +26,12 @@ pub enum Answer {
 }
 
 impl Answer {
+    /// A proof of either.
+    #[inline(always)]
+    const fn of(occluded: bool) -> Self {
+        if occluded { Self::Occluded } else { Self::Unoccluded }
+    }
+
     #[inline]
     const fn unoccluded_if(proved: bool) -> Self {
         if proved { Self::Unoccluded } else { Self::Unknown }

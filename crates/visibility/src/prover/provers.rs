@@ -1,10 +1,11 @@
 //! All provers of one scene: a prover for each light, and the field that they share.
 
 use glam::DVec3;
+use pulp::Arch;
 use vdf_distfield::Neighbourhood;
 use vdf_voxel::{VoxelGrid, VoxelSet};
 
-use super::{Answer, DistanceField, FieldProver, LANES, LightProver};
+use super::{Answer, DistanceField, FieldProver, LightProver};
 use crate::{QueryKind, ShadowQuery, VisibilityError};
 
 /// What neighbourhoods of a point light at `to`, in the grid, say of a segment: the first of one that begins in the grid. One that comes from
@@ -24,6 +25,9 @@ fn by_neighbourhood(
     }
     Answer::unoccluded_if(grid.entry_voxel(from, to).is_some_and(|entry| cuboids.proves(entry)))
 }
+
+/// So many queries are answered one by one where a batch mixes lights.
+const FEW: usize = 32;
 
 /// What a method built for a scene.
 #[derive(Debug)]
@@ -78,29 +82,22 @@ impl Provers {
         }
     }
 
-    /// The answers to all of `queries`, each as [`Provers::answer`] gives it; `answers` must be as long. Cheaper where some one after the other are
+    /// The answers to all of `queries`, each as [`Provers::answer`] gives it; `answers` must be as long. Cheaper where many one after the other are
     /// about one light with a light buffer: asked one by one, each waits for its own texel.
     #[inline]
     pub fn answer_all(&self, queries: &[ShadowQuery], answers: &mut [Answer]) {
-        for (queries, answers) in queries.chunks(LANES).zip(answers.chunks_mut(LANES)) {
-            self.answer_some(queries, answers);
-        }
-    }
-
-    fn answer_some(&self, queries: &[ShadowQuery], answers: &mut [Answer]) {
-        if let [first, _, ..] = queries
-            && let Some(LightProver::Buffer(buffer)) = self.lights.get(first.emitter)
-            && queries.iter().all(|q| q.emitter == first.emitter && q.to == buffer.position())
-        {
-            let mut from = [buffer.position(); LANES];
-            for (from, query) in from.iter_mut().zip(queries) {
-                *from = query.from;
+        let arch = Arch::new();
+        let mut done = 0;
+        while let Some(first) = queries.get(done) {
+            if let Some(LightProver::Buffer(buffer)) = self.lights.get(first.emitter) {
+                done += buffer.answer_run(arch, first.emitter, &queries[done..], &mut answers[done..]);
             }
-            buffer.answer_batch(&from, answers);
-            return;
-        }
-        for (query, answer) in queries.iter().zip(answers) {
-            *answer = self.answer(query);
+            // A few one by one, then there may be a run again.
+            let end = (done + FEW).min(queries.len());
+            for (query, answer) in queries[done..end].iter().zip(&mut answers[done..end]) {
+                *answer = self.answer(query);
+            }
+            done = end;
         }
     }
 

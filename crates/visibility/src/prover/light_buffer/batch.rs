@@ -1,151 +1,230 @@
 //! Look-ups of many queries at once.
 //!
-//! *Idea.* A query waits for its texel, then for its list, then for a record; eight wait no longer than one. So each stage is done for all of them before the next
-//! begins. The first is arithmetic without branches on arrays, which the compiler makes vectors of.
+//! *Idea.* A query waits for its texel, then for its list, then for a record; many wait no longer than one. So each stage is done for a block of them before
+//! the next begins. The first is arithmetic on arrays without a branch, which the compiler makes vectors of, as wide as the machine has them: all of
+//! it is compiled for several instruction sets, of which one is chosen once a run.
 //!
-//! *Guarantee.* The same answers as [`LightBuffer::answer`], by the same operations.
+//! *Guarantee.* The same answers as [`LightBuffer::answer`], with every instruction set.
 
 use glam::DVec3;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::{
-    Answer, LightBuffer, Place, Tag, Texel,
-    build::TILE_TEXELS,
-    frame::{TILE, whole},
-    record::Record,
+    Answer, LightBuffer, Tag, compare,
+    place::{Cube, Direction},
+    tables::View,
 };
+use crate::ShadowQuery;
 
-/// So many queries are looked up together.
-pub(in crate::prover) const LANES: usize = 8;
+/// So many queries go through the stages together: a bit each.
+const BLOCK: usize = 32;
 
-/// The places of queries, field by field.
-struct Places {
-    /// From the light.
-    d: [[f64; LANES]; 3],
-    w: [f64; LANES],
-    inverse_w: [f64; LANES],
-    /// In the texel.
-    x: [f64; LANES],
-    y: [f64; LANES],
-    texel: [u32; LANES],
-    code: [u16; LANES],
-    /// In a window: only then there is a texel.
-    inside: [bool; LANES],
-    /// In none of them, so that nothing can be met. Neither is what is no number, or the light itself.
-    beyond: [bool; LANES],
+/// Stages that are done in vectors are done for a multiple of this.
+const LANES: usize = 8;
+
+/// A multiple of `LANES` that holds so many queries of a block. Lanes beyond the last query hold what was there before.
+#[inline(always)]
+fn lanes(queries: usize) -> usize {
+    (queries.min(BLOCK) + LANES - 1) & !(LANES - 1)
 }
 
 impl LightBuffer {
-    /// What is known of the closed segments from the first of these points to the light, as many as there are `answers`.
-    pub(in crate::prover) fn answer_batch(&self, from: &[DVec3; LANES], answers: &mut [Answer]) {
-        let places = self.places(from);
-        let mut open = [0_usize; LANES];
-        let mut left = 0;
-        for (i, answer) in answers.iter_mut().enumerate().take(LANES) {
-            let texel = self.texels.get(places.texel[i] as usize).unwrap_or(&Texel::EMPTY);
-            let (lit, occluded) = (places.code[i] < texel.lit, places.code[i] >= texel.occluded);
-            let beyond = places.beyond[i];
-            *answer = if lit | beyond { Answer::Unoccluded } else { Answer::Occluded };
-            open[left] = i;
-            left += usize::from(!beyond & !(places.inside[i] & (lit | occluded)));
-        }
-        let open = &open[..left];
-        self.touch(&places, open);
-        for &i in open {
-            answers[i] = self.answer_open(&places, i, from[i]);
-        }
+    /// What is known of the closed segments of the first of `queries`, as long as they are towards this light, the light number `emitter`: of how many
+    /// that is. Whole blocks of them are answered or none; `answers` must be as long.
+    pub(in crate::prover) fn answer_run(
+        &self,
+        arch: Arch,
+        emitter: usize,
+        queries: &[ShadowQuery],
+        answers: &mut [Answer],
+    ) -> usize {
+        arch.dispatch(Run { buffer: self, emitter, queries, answers })
     }
+}
 
-    /// Loads the first records that the open queries will wait for.
-    #[inline]
-    fn touch(&self, places: &Places, open: &[usize]) {
-        let mut first = [0; LANES];
-        for (&i, first) in open.iter().zip(&mut first) {
-            let Some(texel) = self.texels.get(places.texel[i] as usize) else { continue };
-            *first = match texel.tag.kind() {
-                Tag::SINGLE => texel.tag.number(),
-                Tag::LIST => self.entries.get(texel.tag.number()).map_or(0, |entry| entry.triangle as usize),
-                _ => 0,
-            };
-        }
-        let records = first[..open.len()].iter().filter_map(|&record| self.records.get(record));
-        // A load that nobody used would be left out.
-        std::hint::black_box(records.map(Record::first).sum::<f64>());
-    }
+/// Queries that are looked up with one instruction set.
+struct Run<'a> {
+    buffer: &'a LightBuffer,
+    emitter: usize,
+    queries: &'a [ShadowQuery],
+    answers: &'a mut [Answer],
+}
 
-    /// The answer to a query that comparisons leave open.
-    #[inline]
-    fn answer_open(&self, places: &Places, i: usize, from: DVec3) -> Answer {
-        if !places.inside[i] {
-            return self.answer(from);
-        }
-        let place = Place {
-            d: DVec3::new(places.d[0][i], places.d[1][i], places.d[2][i]),
-            w: places.w[i],
-            inverse_w: places.inverse_w[i],
-            x: places.x[i],
-            y: places.y[i],
-            texel: places.texel[i] as usize,
-            code: places.code[i],
-        };
-        self.test(&place, self.texels[place.texel].tag).answer
-    }
+impl WithSimd for Run<'_> {
+    type Output = usize;
 
-    /// As [`LightBuffer::place`].
     #[inline(always)]
-    fn places(&self, from: &[DVec3; LANES]) -> Places {
-        let mut d = [[0.0; LANES]; 3];
-        for (i, from) in from.iter().enumerate() {
-            let at = *from - self.position;
-            (d[0][i], d[1][i], d[2][i]) = (at.x, at.y, at.z);
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        if self.buffer.cube.is_whole() { self.answer::<true>() } else { self.answer::<false>() }
+    }
+}
+
+impl Run<'_> {
+    #[inline(always)]
+    fn answer<const WHOLE: bool>(self) -> usize {
+        let (cube, view) = (&self.buffer.cube, self.buffer.tables.view());
+        let mut places = Places::new();
+        let mut done = 0;
+        for (queries, answers) in self.queries.chunks(BLOCK).zip(self.answers.chunks_mut(BLOCK)) {
+            if !are_towards(queries, self.emitter, cube.light()) {
+                break;
+            }
+            places.find::<WHOLE>(cube, queries);
+            let open = places.compare(&view, answers);
+            if open != 0 {
+                self.buffer.test_open(&view, &places, open, queries, answers);
+            }
+            done += queries.len();
         }
-        let (mut u, mut v, mut w, mut face) = ([0.0; LANES], [0.0; LANES], [0.0; LANES], [0_u32; LANES]);
-        for i in 0..LANES {
-            let [x, y, z] = [d[0][i], d[1][i], d[2][i]];
-            // As `Face::of`.
-            let second = y.abs() > x.abs();
-            let of_two = if second { y.abs() } else { x.abs() };
-            let third = z.abs() > of_two;
-            let (u2, v2, w2) = if second { (z, x, y) } else { (y, z, x) };
-            let along = if third { z } else { w2 };
-            (u[i], v[i], w[i]) = (if third { x } else { u2 }, if third { y } else { v2 }, along.abs());
-            let axis = if third { 4 } else { 2 * u32::from(second) };
-            face[i] = axis + u32::from(along < 0.0);
+        done
+    }
+}
+
+/// Whether all of these queries are towards this light.
+#[inline(always)]
+fn are_towards(queries: &[ShadowQuery], emitter: usize, light: DVec3) -> bool {
+    let [x, y, z] = [light.x.to_bits(), light.y.to_bits(), light.z.to_bits()];
+    // Bits, of four queries at a time, so that one load is compared with one vector. A zero of the other sign is asked about one by one.
+    let (fours, rest) = queries.as_chunks::<4>();
+    for four in fours {
+        let mut differs = [0; 4];
+        for query in four {
+            add_differences(&mut differs, query, [x, y, z], emitter);
         }
-        let mut corner = [[0.0; LANES]; 2];
-        let mut scale = [[0.0; LANES]; 2];
-        let (mut side, mut first) = ([0_u32; LANES], [0_u32; LANES]);
-        for i in 0..LANES {
-            let window = &self.windows[(face[i] as usize).min(5)];
-            ([corner[0][i], corner[1][i]], [scale[0][i], scale[1][i]]) = window.map();
-            (side[i], first[i]) = (window.side(), window.first);
+        if differs[0] | differs[1] | differs[2] | differs[3] != 0 {
+            return false;
         }
-        let mut places = Places {
-            d,
-            w,
-            inverse_w: w.map(f64::recip),
-            x: [0.0; LANES],
-            y: [0.0; LANES],
-            texel: [0; LANES],
-            code: w.map(|w| self.depths.of(w)),
-            inside: [false; LANES],
-            beyond: [false; LANES],
-        };
-        for i in 0..LANES {
-            let inverse = places.inverse_w[i];
-            let x = (u[i] * inverse - corner[0][i]) * scale[0][i];
-            let y = (v[i] * inverse - corner[1][i]) * scale[1][i];
-            let n = f64::from(side[i]);
-            // False for what is no number.
-            let valid = (w[i] > 0.0) & (w[i] < f64::INFINITY) & (x + y < f64::INFINITY);
-            let inside = valid & (x >= 0.0) & (y >= 0.0) & (x < n) & (y < n);
-            let last = side[i].saturating_sub(1);
-            let (column, row) = (whole(x).min(last), whole(y).min(last));
-            (places.x[i], places.y[i]) = (x - f64::from(column), y - f64::from(row));
-            let tile = (row / TILE) * (side[i] / TILE) + column / TILE;
-            let texel = first[i] + tile * TILE_TEXELS as u32 + Self::place_in_tile(column, row) as u32;
-            places.texel[i] = if inside { texel } else { 0 };
-            (places.inside[i], places.beyond[i]) = (inside, valid & !inside);
+    }
+    let mut differs = [0; 4];
+    for query in rest {
+        add_differences(&mut differs, query, [x, y, z], emitter);
+    }
+    differs[0] | differs[1] | differs[2] | differs[3] == 0
+}
+
+/// Adds the bits in which a query's end and emitter differ from these.
+#[inline(always)]
+fn add_differences(differs: &mut [u64; 4], query: &ShadowQuery, [x, y, z]: [u64; 3], emitter: usize) {
+    let to = &query.to;
+    let bits = [to.x.to_bits() ^ x, to.y.to_bits() ^ y, to.z.to_bits() ^ z, (query.emitter ^ emitter) as u64];
+    for i in 0..4 {
+        differs[i] |= bits[i];
+    }
+}
+
+/// The places of a block of queries, field by field as in [`Place`].
+struct Places {
+    x: [[f32; BLOCK]; 3],
+    w: [f32; BLOCK],
+    texel: [u32; BLOCK],
+    code: [u32; BLOCK],
+}
+
+impl Places {
+    const fn new() -> Self {
+        let zero = [0.0; BLOCK];
+        Self { x: [zero; 3], w: zero, texel: [0; BLOCK], code: [0; BLOCK] }
+    }
+
+    /// The places of these queries.
+    #[inline(always)]
+    fn find<const WHOLE: bool>(&mut self, cube: &Cube, queries: &[ShadowQuery]) {
+        let n = queries.len().min(BLOCK);
+        let queries = &queries[..n];
+        let [x, y, z] = &mut self.x;
+        let (dx, dy, dz) = (&mut x[..n], &mut y[..n], &mut z[..n]);
+        // By themselves, for a loop that holds numbers of double precision is made of vectors of half as many lanes.
+        for i in 0..n {
+            [dx[i], dy[i], dz[i]] = cube.difference(queries[i].from);
         }
-        places
+        let n = lanes(n);
+        let (x, y, z, w) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut self.w[..n]);
+        let (texel, code) = (&mut self.texel[..n], &mut self.code[..n]);
+        for i in 0..n {
+            let place = cube.place_of::<WHOLE>([x[i], y[i], z[i]]);
+            [x[i], y[i], z[i]] = place.direction.x;
+            w[i] = place.direction.w;
+            texel[i] = place.texel;
+            code[i] = place.code;
+        }
+    }
+
+    /// The answers by comparisons alone, and a bit for each that they leave open.
+    #[inline(always)]
+    fn compare(&self, view: &View<'_>, answers: &mut [Answer]) -> u32 {
+        let n = lanes(answers.len());
+        let mut depths = [0; BLOCK];
+        let (loaded, _) = depths[..n].as_chunks_mut::<LANES>();
+        let (texels, _) = self.texel[..n].as_chunks::<LANES>();
+        for (depths, texels) in loaded.iter_mut().zip(texels) {
+            for i in 0..LANES {
+                depths[i] = view.texel(texels[i] as usize).depths;
+            }
+        }
+        let (mut found, mut is_open) = ([Answer::Unknown; BLOCK], [false; BLOCK]);
+        for i in 0..n {
+            let (lit, open) = compare(self.code[i], depths[i]);
+            // Those that are left open are so until a triangle blocks their way.
+            found[i] = Answer::of(!(lit | open));
+            is_open[i] = open;
+        }
+        let count = answers.len().min(BLOCK);
+        answers[..count].copy_from_slice(&found[..count]);
+        // Lanes beyond the last query hold anything.
+        let asked = u32::MAX >> (BLOCK - count);
+        (0..BLOCK).fold(0, |open, i| open | u32::from(is_open[i]) << i) & asked
+    }
+
+    #[inline(always)]
+    fn direction(&self, i: usize) -> Direction {
+        Direction { x: [self.x[0][i], self.x[1][i], self.x[2][i]], w: self.w[i] }
+    }
+}
+
+impl LightBuffer {
+    /// Answers those of a block that comparisons leave open, which have a bit in `open`.
+    #[inline(always)]
+    fn test_open(
+        &self,
+        view: &View<'_>,
+        places: &Places,
+        mut open: u32,
+        queries: &[ShadowQuery],
+        answers: &mut [Answer],
+    ) {
+        // Who waits, in the order of the queries: whose it is, where in its list, the record that is next.
+        let (mut lane, mut entry, mut record) = ([0_u32; BLOCK], [0_u32; BLOCK], [0_u32; BLOCK]);
+        let mut waiting = 0;
+        while open != 0 {
+            let i = open.trailing_zeros();
+            open &= open - 1;
+            let tag = view.texel(places.texel[i as usize] as usize).tag;
+            if tag.kind() > Tag::SINGLE {
+                answers[i as usize] = self.answer(queries[i as usize].from);
+                continue;
+            }
+            // A mask, not a branch, which would be taken at random: who waits for one triangle has the first entry as its list, which ends there.
+            let of_list = tag.kind().wrapping_sub(1);
+            let number = tag.number() as u32;
+            let at = waiting % BLOCK;
+            (lane[at], entry[at]) = (i, number & of_list);
+            record[at] = (view.entry((number & of_list) as usize).triangle & of_list) | (number & !of_list);
+            waiting += 1;
+        }
+        // One triangle for each of them, then the next for those that still wait.
+        while waiting > 0 {
+            let mut left = 0;
+            for at in 0..waiting.min(BLOCK) {
+                let (i, number) = (lane[at] as usize % BLOCK, entry[at] as usize);
+                let d = queries[i].from - self.cube.light();
+                let found: Answer = view.record(record[at]).test(d, &places.direction(i)).into();
+                answers[i] = if found == Answer::Unoccluded { answers[i] } else { found };
+                let next = view.entry(number + 1);
+                (lane[left], entry[left], record[left]) = (i as u32, number as u32 + 1, next.triangle);
+                let ends = (view.entry(number).last == 1) | (places.code[i] < u32::from(next.nearest));
+                left += usize::from(!(ends | (found == Answer::Occluded)));
+            }
+            waiting = left;
+        }
     }
 }

@@ -18,8 +18,10 @@ use super::{
     Entry, LightBuffer, Refusal, Tag, Texel,
     cone::Cone,
     frame::{DepthCode, Face, NEVER, Rect, TILE, Window},
+    place::{self, Cube},
     record::Record,
     sheets,
+    tables::Tables,
 };
 
 /// Texels of a tile.
@@ -88,6 +90,25 @@ impl Extent {
     }
 }
 
+impl Extent {
+    /// The windows of all faces, with so many texels along each side. Where geometry fills half of all directions or more they are whole faces, for the
+    /// sake of quick look-ups.
+    fn windows(&self, side: u32) -> [Window; 6] {
+        let area = |[u0, u1, v0, v1]: &[f64; 4]| (u1 - u0) * (v1 - v0);
+        let whole = self.faces.iter().flatten().map(area).sum::<f64>() > 12.0;
+        let mut first = place::FIRST;
+        self.faces.map(|bounds| {
+            let window = match bounds {
+                _ if whole => Window::whole(side, first),
+                Some(bounds) => Window::new(bounds, side, first),
+                None => return Window::NONE,
+            };
+            first += side * side;
+            window
+        })
+    }
+}
+
 fn join(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])]
 }
@@ -121,21 +142,17 @@ impl LightBuffer {
         }
         // Nothing may cost more than its texels: faces are known now.
         let texels_per_face = u64::from(side) * u64::from(side);
-        let faces = extent.faces.iter().flatten().count() as u64;
+        let windows = extent.windows(side);
+        let faces = windows.iter().filter(|w| w.side() > 0).count() as u64;
         if faces * texels_per_face * size_of::<Texel>() as u64 > max_bytes || triangles.len() > Tag::MOST {
             return Err(Refusal::Memory);
         }
-        let mut first = 0;
-        let windows = extent.faces.map(|bounds| {
-            bounds.map_or(Window::NONE, |bounds| {
-                let window = Window::new(bounds, side, first);
-                first += side * side;
-                window
-            })
-        });
         let diagonal = vdf_geometry::Bounds::of_triangles(triangles).extent().length();
         if faces > 0 && extent.nearest > FARTHEST * diagonal {
             return Err(Refusal::FarAway);
+        }
+        if faces > 0 && !(1.0 / DepthCode::FARTHEST..DepthCode::FARTHEST).contains(&extent.farthest) {
+            return Err(Refusal::Range);
         }
         let depths = DepthCode::new(extent.nearest.min(extent.farthest), extent.farthest);
         let bins = Bins::new(triangles, light, &windows);
@@ -161,7 +178,7 @@ impl LightBuffer {
         if budget.exceeded() {
             return Err(Refusal::Memory);
         }
-        let buffer = merge(triangles, light, windows, depths, tiles);
+        let buffer = merge(triangles, Cube::new(light, &windows, depths), &windows, &bins, tiles);
         if buffer.bytes() as u64 > max_bytes { Err(Refusal::Memory) } else { Ok(buffer) }
     }
 }
@@ -320,7 +337,7 @@ impl TileBuilder<'_> {
                     self.divide(x, y, part, sorted);
                 } else {
                     let texel = self.texel(f64::from(x), f64::from(y), 1.0, 0, sorted, covered);
-                    self.out.texels[LightBuffer::place_in_tile(x, y)] = texel;
+                    self.out.texels[place::in_tile(x, y)] = texel;
                 }
             }
             self.scratch.truncate(sorted);
@@ -358,8 +375,8 @@ impl TileBuilder<'_> {
         let (cone, tag) = (&self.cones[cone as usize], Tag::single(self.numbers[cone as usize]));
         for (x, y) in (y..y + size).flat_map(|y| (x..x + size).map(move |x| (x, y))) {
             if let Some([near, far]) = cone.depths(&self.window.rect(f64::from(x), f64::from(y), 1.0)) {
-                self.out.texels[LightBuffer::place_in_tile(x, y)] =
-                    Texel { lit: self.depths.lower(near), occluded: self.depths.upper(far), tag };
+                self.out.texels[place::in_tile(x, y)] =
+                    Texel::new(self.depths.lower(near), self.depths.upper(far), tag);
             }
         }
     }
@@ -424,7 +441,7 @@ impl TileBuilder<'_> {
         let lower = |near| self.depths.lower(near);
         if let [only] = self.scratch[start..] {
             let number = self.numbers[only.cone as usize];
-            return Texel { lit: lower(only.near), occluded, tag: Tag::single(number) };
+            return Texel::new(lower(only.near), occluded, Tag::single(number));
         }
         if count == 0 {
             return Texel::EMPTY;
@@ -434,7 +451,7 @@ impl TileBuilder<'_> {
             && divisions < DIVISIONS
             && let Some(first) = self.parts(x, y, size, divisions, start)
         {
-            return Texel { lit, occluded, tag: Tag::parts(first) };
+            return Texel::new(lit, occluded, Tag::parts(first));
         }
         self.budget.spend(count * size_of::<Entry>());
         let first = self.out.entries.len();
@@ -444,7 +461,7 @@ impl TileBuilder<'_> {
         let list = &mut self.out.entries[first..];
         list.sort_unstable_by_key(|e| (e.nearest, e.triangle));
         list[count - 1].last = 1;
-        Texel { lit, occluded, tag: Tag::list(first) }
+        Texel::new(lit, occluded, Tag::list(first))
     }
 }
 
@@ -476,13 +493,7 @@ impl TileBuilder<'_> {
 }
 
 /// Puts the tiles together: lists one after the other, records of the triangles that occur.
-fn merge(
-    triangles: &[Triangle],
-    light: DVec3,
-    windows: [Window; 6],
-    depths: DepthCode,
-    tiles: Vec<Tile>,
-) -> LightBuffer {
+fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins, tiles: Vec<Tile>) -> LightBuffer {
     let mut occurs = vec![0_u32; triangles.len()];
     for tile in &tiles {
         let singles = tile.texels.iter().chain(&tile.parts).filter_map(|t| t.tag.as_single());
@@ -495,30 +506,36 @@ fn merge(
         occurs[number as usize] = record;
     }
     let record_of = occurs;
-    let records = numbers
-        .par_iter()
-        .filter_map(|&number| Cone::new(&triangles[number as usize], light).map(|cone| Record::new(&cone)))
-        .collect();
-    // The tiles' texels come first, then all that are divided.
-    let mut offsets = Vec::with_capacity(tiles.len());
-    let (mut part, mut entry) = (tiles.len() * TILE_TEXELS, 0);
-    for tile in &tiles {
-        offsets.push((part, entry));
+    // Texels of no face, those of the tiles, all that are divided.
+    let mut part = place::FIRST as usize + tiles.len() * TILE_TEXELS;
+    let all_parts = tiles.iter().map(|tile| tile.parts.len()).sum::<usize>();
+    let mut entry = 1;
+    // One more at the end: who reads an entry may read the next.
+    let all_entries = 1 + entry + tiles.iter().map(|tile| tile.entries.len()).sum::<usize>();
+    let mut tables = Tables::zeroed(part + all_parts, all_entries, numbers.len());
+    let mut view = tables.view_mut();
+    view.records().par_iter_mut().zip(&numbers).for_each(|(record, &number)| {
+        // Those that have no cone do not occur.
+        if let Some(cone) = Cone::new(&triangles[number as usize], cube.light()) {
+            *record = Record::new(&cone).0;
+        }
+    });
+    view.put_texels(0, (0..place::FIRST).map(|i| if i == place::UNKNOWN { Texel::UNKNOWN } else { Texel::EMPTY }));
+    view.put_entries(0, [Entry { triangle: 0, nearest: 0, last: 1 }].into_iter());
+    let moved = |texel: &Texel, part, entry| Texel { tag: texel.tag.moved(&record_of, part, entry), ..*texel };
+    for (number, tile) in tiles.iter().enumerate() {
+        let (face, x, y) = bins.tile(number);
+        let window = &windows[face.index()];
+        // A tile's squares of texels are rows of eight, which are parts of the window's.
+        for (j, squares) in (0..).zip(tile.texels.chunks((place::SQUARE * TILE) as usize)) {
+            let first = place::in_window(x * TILE, y * TILE + j * place::SQUARE, window.side().ilog2());
+            view.put_texels((window.first + first) as usize, squares.iter().map(|t| moved(t, part, entry)));
+        }
+        view.put_texels(part, tile.parts.iter().map(|t| moved(t, part, entry)));
+        let of_all = |e: &Entry| Entry { triangle: record_of[e.triangle as usize], ..*e };
+        view.put_entries(entry, tile.entries.iter().map(of_all));
         part += tile.parts.len();
         entry += tile.entries.len();
     }
-    let mut texels = Vec::with_capacity(part);
-    let mut entries = Vec::with_capacity(entry);
-    let moved = |texel: &Texel, (part, entry): (usize, usize)| Texel {
-        tag: texel.tag.moved(&record_of, part, entry),
-        ..*texel
-    };
-    for (tile, offset) in tiles.iter().zip(&offsets) {
-        texels.extend(tile.texels.iter().map(|t| moved(t, *offset)));
-    }
-    for (tile, offset) in tiles.iter().zip(&offsets) {
-        texels.extend(tile.parts.iter().map(|t| moved(t, *offset)));
-        entries.extend(tile.entries.iter().map(|e| Entry { triangle: record_of[e.triangle as usize], ..*e }));
-    }
-    LightBuffer { position: light, windows, depths, texels, entries, records }
+    LightBuffer { cube, tables }
 }

@@ -13,7 +13,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use vdf_geometry::Triangle;
 
-use super::frame::{Face, Rect, SLACK};
+use super::frame::{DEPTH_SLACK, Face, Rect, SLACK};
 
 /// 2⁻⁴⁸: 32 halves of an ulp of 1.
 const ROUNDING: f64 = 1.0 / (1_u64 << 48) as f64;
@@ -115,7 +115,7 @@ impl Cone {
         let (min, max) = (a.min(b).min(c), a.max(b).max(c));
         let to_box = min.max(-max).max(DVec3::ZERO).length();
         let to_plane = 1.0 / (self.plane.length() + 2.0 * self.plane_error);
-        to_box.max(to_plane) * (1.0 - SLACK)
+        to_box.max(to_plane) * (1.0 - DEPTH_SLACK)
     }
 
     /// The part of this face that may see the triangle: least and greatest u, least and greatest v; `None` if none does. For a cone in the
@@ -148,7 +148,9 @@ impl Cone {
     /// False only if a side of the rectangle separates it from the triangle, wherever the vertices are.
     fn is_on_the_side(&self, rect: &Rect) -> bool {
         let beyond = |outside: [f64; 3], size: [f64; 3]| {
-            outside[0] > size[0] * SLACK && outside[1] > size[1] * SLACK && outside[2] > size[2] * SLACK
+            outside[0] > size[0] * DEPTH_SLACK
+                && outside[1] > size[1] * DEPTH_SLACK
+                && outside[2] > size[2] * DEPTH_SLACK
         };
         let v = &self.vertices;
         let size = v.map(|v| v.abs().max_element());
@@ -230,7 +232,7 @@ impl Cone {
             return None;
         }
         let far = if least > 0.0 { farthest.min(least.recip()) } else { farthest };
-        Some([nearest.max(most.recip()) * (1.0 - SLACK), far * (1.0 + SLACK)])
+        Some([nearest.max(most.recip()) * (1.0 - DEPTH_SLACK), far * (1.0 + DEPTH_SLACK)])
     }
 }
 

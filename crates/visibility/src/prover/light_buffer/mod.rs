@@ -22,31 +22,30 @@ mod batch;
 mod build;
 mod cone;
 mod frame;
+mod place;
 mod record;
 mod sheets;
+mod tables;
 #[cfg(test)]
 mod tests;
 
 use glam::DVec3;
 
-pub(in crate::prover) use self::batch::LANES;
 use self::{
-    build::{PARTS, TILE_TEXELS},
-    frame::{DepthCode, Face, NEVER, TILE, Window},
-    record::{Record, Verdict},
+    build::PARTS,
+    frame::NEVER,
+    place::{Cube, Direction, Place},
+    record::Verdict,
+    tables::{Tables, View},
 };
 use super::Answer;
 
 /// The buffer of one point light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightBuffer {
-    position: DVec3,
-    windows: [Window; 6],
-    depths: DepthCode,
-    /// Tile by tile; then the parts of texels that are divided.
-    texels: Vec<Texel>,
-    entries: Vec<Entry>,
-    records: Vec<Record>,
+    cube: Cube,
+    /// Texels of no face, those of the faces, then the parts of those that are divided; lists, of which the first and the last entry belong to none; records.
+    tables: Tables,
 }
 
 /// Why a light has no buffer.
@@ -56,6 +55,8 @@ pub enum Refusal {
     OnOccluder,
     /// It is so far away that its texels cannot tell the triangles apart.
     FarAway,
+    /// What it sees is too small or too far away for single precision.
+    Range,
     /// The buffer would take more memory than is allowed.
     Memory,
     /// It, or a vertex, is not finite.
@@ -69,6 +70,7 @@ impl Refusal {
         match self {
             Self::OnOccluder => "it lies on an occluder, which blocks every way to it",
             Self::FarAway => "it is too far away for a light buffer",
+            Self::Range => "what it sees is too small or too large for single precision",
             Self::Memory => "its light buffer does not fit into the limit of memory",
             Self::NotFinite => "it, or a vertex, is not finite",
         }
@@ -87,15 +89,36 @@ pub struct LookUp {
 /// What is known of a pyramid of directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Texel {
-    /// A query with a lower code meets nothing.
-    lit: u16,
-    /// A query with this code or a higher one is occluded.
-    occluded: u16,
+    /// Two codes of depths: a query with a lower code than the low half meets nothing, one with the high half or a higher one is occluded.
+    depths: u32,
     tag: Tag,
 }
 
 impl Texel {
-    const EMPTY: Self = Self { lit: NEVER, occluded: NEVER, tag: Tag(0) };
+    /// Nothing is met.
+    const EMPTY: Self = Self::new(NEVER, NEVER, Tag::NOTHING);
+    /// Nothing is known.
+    const UNKNOWN: Self = Self::new(0, NEVER, Tag::NOTHING);
+
+    const fn new(lit: u16, occluded: u16, tag: Tag) -> Self {
+        Self { depths: (occluded as u32) << 16 | lit as u32, tag }
+    }
+
+    #[inline(always)]
+    const fn of([depths, tag]: [u32; 2]) -> Self {
+        Self { depths, tag: Tag(tag) }
+    }
+
+    const fn pair(self) -> [u32; 2] {
+        [self.depths, self.tag.0]
+    }
+}
+
+/// Whether comparisons of a query's code with a texel's depths find it lit, and whether they leave it open.
+#[inline(always)]
+const fn compare(code: u32, depths: u32) -> (bool, bool) {
+    let (lit, occluded) = (code < depths & 0xffff, code >= depths >> 16);
+    (lit, !(lit | occluded))
 }
 
 /// What decides the other queries: two bits of kind and a number.
@@ -108,6 +131,9 @@ impl Tag {
     const NUMBER: u32 = (1 << 30) - 1;
     const LIST: u32 = 0;
     const SINGLE: u32 = 1;
+    const PARTS: u32 = 2;
+    /// Nobody knows.
+    const NOTHING: Self = Self(3 << 30);
 
     /// The list that starts at this entry.
     const fn list(first: usize) -> Self {
@@ -121,7 +147,7 @@ impl Tag {
 
     /// The parts that start at this texel.
     const fn parts(first: usize) -> Self {
-        Self((2 << 30) | first as u32)
+        Self((Self::PARTS << 30) | first as u32)
     }
 
     #[inline]
@@ -143,7 +169,8 @@ impl Tag {
         match self.kind() {
             Self::LIST => Self::list(self.number() + entry),
             Self::SINGLE => Self::single(record_of[self.number()]),
-            _ => Self::parts(self.number() + part),
+            Self::PARTS => Self::parts(self.number() + part),
+            _ => self,
         }
     }
 }
@@ -159,30 +186,29 @@ struct Entry {
     last: u16,
 }
 
-/// A query's place: what comparisons and tests need of it.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    d: DVec3,
-    w: f64,
-    inverse_w: f64,
-    /// Where in the texel, from 0 to 1.
-    x: f64,
-    y: f64,
-    texel: usize,
-    code: u16,
+impl Entry {
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "the low half is the nearest")]
+    const fn of([triangle, more]: [u32; 2]) -> Self {
+        Self { triangle, nearest: more as u16, last: (more >> 16) as u16 }
+    }
+
+    const fn pair(self) -> [u32; 2] {
+        [self.triangle, (self.last as u32) << 16 | self.nearest as u32]
+    }
 }
 
 impl LightBuffer {
     /// Where the light is.
     #[must_use]
     pub const fn position(&self) -> DVec3 {
-        self.position
+        self.cube.light()
     }
 
     /// Texels along each side of a face.
     #[must_use]
-    pub fn side(&self) -> u32 {
-        self.windows.iter().map(Window::side).max().unwrap_or(0)
+    pub const fn side(&self) -> u32 {
+        self.cube.side()
     }
 
     /// Bytes of the texels of six faces with `side` texels along each side.
@@ -192,8 +218,8 @@ impl LightBuffer {
 
     /// Its memory in bytes.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        size_of_val(&self.texels[..]) + size_of_val(&self.entries[..]) + size_of_val(&self.records[..])
+    pub const fn bytes(&self) -> usize {
+        self.tables.bytes()
     }
 
     /// What is known of the closed segment from `from` to the light. Never wrong.
@@ -207,96 +233,81 @@ impl LightBuffer {
     #[inline]
     #[must_use]
     pub fn look_up(&self, from: DVec3) -> LookUp {
-        match self.place(from) {
-            Ok(place) => self.decide(&place, self.texels[place.texel]),
-            Err(answer) => LookUp { answer, tests: 0 },
+        let place = self.cube.place(from);
+        let texel = self.tables.texel(place.texel);
+        let (lit, open) = compare(place.code, texel.depths);
+        if open {
+            return self.tables.view().test(&place, from - self.cube.light(), texel.tag);
         }
+        LookUp { answer: Answer::of(!lit), tests: 0 }
     }
+}
 
-    /// The place of a query, or its answer if it has none.
-    #[inline(always)]
-    fn place(&self, from: DVec3) -> Result<Place, Answer> {
-        let d = from - self.position;
-        let face = Face::of(d);
-        let [u, v, w] = face.magnitudes(d);
-        // The light itself, and what is no number.
-        if !(w > 0.0 && d.is_finite()) {
-            return Err(Answer::Unknown);
-        }
-        let window = &self.windows[face.index()];
-        let inverse_w = w.recip();
-        let Some(([i, j], [x, y])) = window.place(u * inverse_w, v * inverse_w) else { return Err(Answer::Unoccluded) };
-        let tile = (j / TILE) * (window.side() / TILE) + i / TILE;
-        let texel = window.first as usize + tile as usize * TILE_TEXELS + Self::place_in_tile(i, j);
-        Ok(Place { d, w, inverse_w, x, y, texel, code: self.depths.of(w) })
-    }
-
-    /// The number of a texel in its tile: squares of 8 × 8, row by row.
+impl View<'_> {
+    /// The answer by the triangles that may decide, for a difference `d` of point and light.
     #[inline]
-    const fn place_in_tile(x: u32, y: u32) -> usize {
-        ((((y >> 3) & 7) << 9) | (((x >> 3) & 7) << 6) | ((y & 7) << 3) | (x & 7)) as usize
-    }
-
-    /// The answer at a place.
-    #[inline]
-    fn decide(&self, place: &Place, texel: Texel) -> LookUp {
-        if place.code < texel.lit {
-            LookUp { answer: Answer::Unoccluded, tests: 0 }
-        } else if place.code >= texel.occluded {
-            LookUp { answer: Answer::Occluded, tests: 0 }
-        } else {
-            self.test(place, texel.tag)
-        }
-    }
-
-    /// The answer by the triangles that may decide.
-    #[inline]
-    fn test(&self, place: &Place, tag: Tag) -> LookUp {
-        #[allow(clippy::cast_possible_truncation, reason = "`Record` covers the rounding")]
-        let x = (place.d * place.inverse_w).as_vec3();
-        let (tests, verdict) = match tag.kind() {
-            Tag::SINGLE => (1, self.records[tag.number()].test(place.d, x, place.w)),
-            Tag::LIST => {
-                let (mut tests, mut found) = (0, Verdict::Passes);
-                for entry in &self.entries[tag.number()..] {
-                    if place.code < entry.nearest {
-                        break;
-                    }
-                    tests += 1;
-                    match self.records[entry.triangle as usize].test(place.d, x, place.w) {
-                        Verdict::Passes => {}
-                        Verdict::Close => found = Verdict::Close,
-                        Verdict::Blocks => {
-                            found = Verdict::Blocks;
-                            break;
-                        }
-                    }
-                    if entry.last == 1 {
-                        break;
-                    }
-                }
-                (tests, found)
+    fn test(&self, place: &Place, d: DVec3, tag: Tag) -> LookUp {
+        match tag.kind() {
+            Tag::SINGLE => {
+                LookUp { answer: self.record(tag.number() as u32).test(d, &place.direction).into(), tests: 1 }
             }
-            _ => return self.decide_part(place, tag.number()),
-        };
-        let answer = match verdict {
-            Verdict::Passes => Answer::Unoccluded,
-            Verdict::Blocks => Answer::Occluded,
-            Verdict::Close => Answer::Unknown,
-        };
-        LookUp { answer, tests }
+            Tag::LIST => self.test_list(place.code, d, &place.direction, tag.number()),
+            Tag::PARTS => self.look_up_part(place, d, tag.number()),
+            _ => LookUp { answer: Answer::Unknown, tests: 0 },
+        }
+    }
+
+    /// The answer by a list, from this entry on.
+    #[inline]
+    fn test_list(&self, code: u32, d: DVec3, direction: &Direction, first: usize) -> LookUp {
+        let (mut tests, mut found) = (0, Verdict::Passes);
+        for number in first.. {
+            let entry = self.entry(number);
+            if code < u32::from(entry.nearest) {
+                break;
+            }
+            tests += 1;
+            match self.record(entry.triangle).test(d, direction) {
+                Verdict::Passes => {}
+                Verdict::Close => found = Verdict::Close,
+                Verdict::Blocks => {
+                    found = Verdict::Blocks;
+                    break;
+                }
+            }
+            if entry.last == 1 {
+                break;
+            }
+        }
+        LookUp { answer: found.into(), tests }
     }
 
     /// The answer in the part of a divided texel, whose parts start at `first`.
     #[cold]
-    fn decide_part(&self, place: &Place, first: usize) -> LookUp {
-        let parts = f64::from(PARTS);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the number of parts")]
-        let part = |at: f64| {
+    fn look_up_part(&self, place: &Place, d: DVec3, first: usize) -> LookUp {
+        let parts = PARTS as f32;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what there is")]
+        let part = |at: f32| {
             let part = ((at * parts) as u32).min(PARTS - 1);
-            (part as usize, at * parts - f64::from(part))
+            (part as usize, at * parts - part as f32)
         };
-        let ((i, x), (j, y)) = (part(place.x), part(place.y));
-        self.decide(&Place { x, y, ..*place }, self.texels[first + j * PARTS as usize + i])
+        let [(i, x), (j, y)] = place.at.map(part);
+        let texel = self.texel(first + j * PARTS as usize + i);
+        let (lit, open) = compare(place.code, texel.depths);
+        if open {
+            return self.test(&Place { at: [x, y], ..*place }, d, texel.tag);
+        }
+        LookUp { answer: Answer::of(!lit), tests: 0 }
+    }
+}
+
+impl From<Verdict> for Answer {
+    #[inline(always)]
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Passes => Self::Unoccluded,
+            Verdict::Blocks => Self::Occluded,
+            Verdict::Close => Self::Unknown,
+        }
     }
 }

@@ -2,36 +2,37 @@
 //!
 //! Nearly always in a few operations, and exactly; else the answer is [`Verdict::Close`].
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
-use super::cone::Cone;
+use super::{cone::Cone, place::Direction};
 
 /// Whether a triangle meets the segment from a point to the light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
-    Blocks,
     Passes,
+    Blocks,
     /// Too close to an edge or to the plane for the rounding here.
     Close,
 }
 
 /// A triangle as a light sees it: the planes of its edges in single precision, its own in double.
 ///
-/// *Rounding.* With u = 2⁻²⁴ and the point relative to the light divided by its largest component, products of an edge's normal (components
-/// of at most 1, rounded by u and known as well as u before) and the point (rounded by u) err by 4u each with their own rounding, and their
-/// sum by 5u more: by less than [`EDGE_ERROR`] = 24u. Superficial queries start 2⁻³² of their coordinates off their own surface; so the plane is in double
-/// precision.
+/// *Rounding.* With ε = 2⁻²⁴ and a point relative to the light divided by its largest component, in single precision: components of an edge's normal, at
+/// most 1, are rounded by ε and known as well as ε before; those of the point have errors of 3ε, by its difference, the reciprocal and the product. (The
+/// error of the largest component scales all of them, which changes no sign.) With the product's own rounding that is 6ε for each of three, and their
+/// sum errs by 5ε more: by less than [`EDGE_ERROR`] = 32ε. Superficial queries start 2⁻³² of their coordinates off their own surface; so the plane is in
+/// double precision, and so is the point that is put into it.
+///
+/// Numbers: the x of the three edges' normals, their y, their z; then the largest error of a product of the plane and a point, over the point's largest
+/// component; then the plane's three numbers, as their bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(64))]
-pub(super) struct Record {
-    plane: DVec3,
-    edges: [Vec3; 3],
-    /// The largest error of a product of `plane` and a point, over the point's largest component.
-    plane_error: f32,
-}
+pub(super) struct Record(pub(super) [f32; 16]);
+
+/// Where the plane starts, in bytes.
+const PLANE: usize = 40;
 
 /// See [`Record`].
-const EDGE_ERROR: f32 = 24.0 / 16_777_216.0;
+const EDGE_ERROR: f32 = 32.0 / 16_777_216.0;
 
 /// The error of the last difference, from one.
 const ONE_ERROR: f64 = 4.0 * f64::EPSILON;
@@ -43,31 +44,33 @@ impl Record {
             // Close to it is everywhere where the normal itself is hardly known.
             if cone.edge_errors[i] < 1.0 / 16_777_216.0 { cone.edges[i].as_vec3() } else { Vec3::ZERO }
         };
-        #[allow(clippy::cast_possible_truncation, reason = "rounded up")]
-        let plane_error = ((4.0 * cone.plane_error) as f32).next_up();
-        Self { plane: cone.plane, edges: [edge(0), edge(1), edge(2)], plane_error }
+        let [a, b, c] = [edge(0), edge(1), edge(2)];
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "rounded up, as is the single precision of what it is multiplied with"
+        )]
+        let plane_error = ((4.5 * cone.plane_error) as f32).next_up();
+        let mut all = [a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z, plane_error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        bytemuck::bytes_of_mut(&mut all)[PLANE..].copy_from_slice(bytemuck::bytes_of(&cone.plane.to_array()));
+        Self(all)
     }
 
-    /// Its first number: who reads it has loaded the record.
-    #[inline]
-    pub(super) const fn first(&self) -> f64 {
-        self.plane.x
-    }
-
-    /// Whether the triangle meets the closed segment from the light to the light + `d`; `x` is `d` over its largest component `w`.
+    /// Whether the triangle meets the closed segment from the light to the light + `d`, whose direction is also given in single precision.
     #[inline(always)]
-    pub(super) fn test(&self, d: DVec3, x: Vec3, w: f64) -> Verdict {
-        let [a, b, c] = self.edges;
-        let least = a.dot(x).min(b.dot(x)).min(c.dot(x));
-        let behind = self.plane.dot(d) - 1.0;
-        let error = f64::from(self.plane_error) * w + ONE_ERROR;
-        if least < -EDGE_ERROR || behind < -error {
-            Verdict::Passes
-        } else if least > EDGE_ERROR && behind > error {
-            Verdict::Blocks
-        } else {
-            Verdict::Close
-        }
+    pub(super) fn test(self, d: DVec3, &Direction { x: [x, y, z], w }: &Direction) -> Verdict {
+        // All three edges at once; the fourth lane says nothing.
+        let [ex, ey, ez] = [0, 3, 6].map(|i| Vec4::from_slice(&self.0[i..i + 4]));
+        let [a, b, c, _] = (ex * x + ey * y + ez * z).to_array();
+        let of_two = if b < a { b } else { a };
+        let least = if c < of_two { c } else { of_two };
+        let [px, py, pz]: [f64; 3] = bytemuck::pod_read_unaligned(&bytemuck::bytes_of(&self.0)[PLANE..]);
+        let behind = px * d.x + py * d.y + pz * d.z - 1.0;
+        let error = f64::from(self.0[9]) * f64::from(w) + ONE_ERROR;
+        let passes = (least < -EDGE_ERROR) | (behind < -error);
+        let blocks = (least > EDGE_ERROR) & (behind > error);
+        // Not branches, which would be taken at random.
+        let known = if blocks { Verdict::Blocks } else { Verdict::Close };
+        if passes { Verdict::Passes } else { known }
     }
 }
 
@@ -79,7 +82,7 @@ mod tests {
 
     #[test]
     fn it_is_a_cache_line() {
-        assert_eq!((size_of::<Record>(), align_of::<Record>()), (64, 64));
+        assert_eq!(size_of::<Record>(), 64);
     }
 
     /// Points on, before and behind triangles, on their edges' planes and ulps beside: a verdict is what the exact test says, and few are close
@@ -116,7 +119,10 @@ mod tests {
                 continue;
             }
             let hit = intersect_exact(&Segment::new(from, light), &triangle).is_some();
-            match record.test(d, (d / w).as_vec3(), w) {
+            let single = d.as_vec3();
+            let largest = single.abs().max_element();
+            let direction = Direction { x: (single * largest.recip()).to_array(), w: largest };
+            match record.test(d, &direction) {
                 Verdict::Blocks => {
                     blocks += 1;
                     assert!(hit, "{triangle:?} {light} {from}");

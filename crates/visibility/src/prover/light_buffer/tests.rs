@@ -1,14 +1,20 @@
 //! Light buffers against a loop of exact tests over all triangles.
 
 use glam::{DVec3, Vec3, dvec3};
+use pulp::Arch;
 use vdf_geometry::{Segment, Triangle, intersect_exact};
 
 use super::*;
+use crate::{QueryKind, ShadowQuery};
 
 /// The slow twin.
 fn occluded(triangles: &[Triangle], from: DVec3, light: DVec3) -> bool {
     let segment = Segment::new(from, light);
     triangles.iter().any(|t| intersect_exact(&segment, t).is_some())
+}
+
+const fn query(from: DVec3, to: DVec3) -> ShadowQuery {
+    ShadowQuery { from, to, emitter: 0, kind: QueryKind::Spatial }
 }
 
 fn quad(corners: [[f32; 3]; 4]) -> [Triangle; 2] {
@@ -146,7 +152,7 @@ fn answers_are_those_of_a_loop() {
             let buffer = LightBuffer::build(&triangles, light, side, 1 << 30).expect(name);
             let (mut known, mut tests, mut blocked) = (0, 0, 0);
             const ASKED: usize = 12_000;
-            let mut together = ([DVec3::ZERO; LANES], [Answer::Unknown; LANES]);
+            let mut together = (Vec::new(), Vec::new());
             for kind in 0..ASKED {
                 let from = hard_point(&mut random, &triangles, light, kind);
                 let LookUp { answer, tests: n } = buffer.look_up(from);
@@ -155,17 +161,24 @@ fn answers_are_those_of_a_loop() {
                     answer == Answer::Unknown || (answer == Answer::Occluded) == truth,
                     "{name}, {side}: {from:?} is {truth}, not {answer:?} after {n} tests"
                 );
-                (together.0[kind % LANES], together.1[kind % LANES]) = (from, answer);
-                // Every number of queries at once, up to all.
-                let count = kind % LANES + 1;
-                let mut answers = [Answer::Unknown; LANES];
-                buffer.answer_batch(&together.0, &mut answers[..count]);
-                assert_eq!(answers[..count], together.1[..count], "{name}, {side}: {:?}", together.0);
+                together.0.push(query(from, light));
+                together.1.push(answer);
                 // Towards edges, vertices and points of the very surface an answer would be luck.
                 if !matches!(kind % 12, 1 | 2 | 3 | 5 | 6 | 8 | 11) {
                     known += usize::from(answer != Answer::Unknown);
                     tests += n;
                     blocked += usize::from(truth);
+                }
+            }
+            // Every number of queries at once, with every instruction set.
+            for arch in [Arch::new(), Arch::Scalar] {
+                let (mut rest, mut count) = ((&together.0[..], &together.1[..]), 0);
+                while !rest.0.is_empty() {
+                    count = (count % 70 + 1).min(rest.0.len());
+                    let mut answers = vec![Answer::Unknown; count];
+                    assert_eq!(buffer.answer_run(arch, 0, &rest.0[..count], &mut answers), count);
+                    assert_eq!(answers, rest.1[..count], "{name}, {side}, {arch:?}: {:?}", &rest.0[..count]);
+                    rest = (&rest.0[count..], &rest.1[count..]);
                 }
             }
             // Where the light nearly touches a plane that plane leaves much open.
@@ -186,6 +199,10 @@ fn a_light_on_an_occluder_or_far_away_has_no_buffer() {
     assert_eq!(build(dvec3(1e5, 0.0, 0.0)), Some(Refusal::FarAway));
     assert_eq!(LightBuffer::build(&room, DVec3::ZERO, 64, 1000).err(), Some(Refusal::Memory));
     assert_eq!(build(dvec3(0.0, f64::NAN, 0.0)), Some(Refusal::NotFinite));
+    for size in [1e-30, 1e30] {
+        let room = walls(Vec3::splat(-size), Vec3::splat(size), 2);
+        assert_eq!(LightBuffer::build(&room, DVec3::ZERO, 64, 1 << 30).err(), Some(Refusal::Range), "{size}");
+    }
     let mut torn = room.clone();
     torn[5].vertices[1].y = f32::INFINITY;
     assert_eq!(LightBuffer::build(&torn, DVec3::ZERO, 64, 1 << 30).err(), Some(Refusal::NotFinite));
@@ -199,11 +216,12 @@ fn nothing_is_said_about_what_is_no_point() {
     let one_is_none = DVec3::ONE.with_y(f64::NAN);
     for from in [DVec3::NAN, one_is_none, DVec3::INFINITY, DVec3::X * f64::NAN, DVec3::Y * f64::NEG_INFINITY, light] {
         assert_eq!(buffer.answer(from), Answer::Unknown, "{from}");
-        let mut together = [Answer::Occluded; LANES];
-        buffer.answer_batch(&[from; LANES], &mut together);
-        assert_eq!(together, [Answer::Unknown; LANES], "{from}");
+        let mut together = [Answer::Occluded; 9];
+        assert_eq!(buffer.answer_run(Arch::new(), 0, &[query(from, light); 9], &mut together), 9);
+        assert_eq!(together, [Answer::Unknown; 9], "{from}");
     }
-    assert_eq!(buffer.answer(DVec3::X * 1e300), Answer::Occluded);
+    assert_eq!(buffer.answer(DVec3::X * 1e30), Answer::Occluded);
+    assert_eq!(buffer.answer(DVec3::X * 1e300), Answer::Unknown, "too far for single precision");
 }
 
 #[test]
@@ -219,8 +237,8 @@ fn it_is_the_same_for_any_number_of_threads() {
     };
     let one = build(1);
     assert_eq!(one, build(3));
-    assert!(one.entries.iter().any(|e| e.last == 1), "it has lists");
-    assert!(one.texels.iter().any(|t| t.tag.kind() == 2), "it has parts");
+    assert!(one.tables.view().entries().skip(1).any(|e| e.last == 1), "it has lists");
+    assert!(one.tables.view().texels().any(|t| t.tag.kind() == 2), "it has parts");
     // Where they are they are asked.
     for _ in 0..4000 {
         let from = DVec3::splat(0.5) + random_point(&mut random, 0.06);
@@ -238,6 +256,7 @@ fn memory_is_bounded_before_it_is_taken() {
     let build = |max_bytes| LightBuffer::build(&many, dvec3(0.1, 0.2, 0.3), 64, max_bytes);
     assert_eq!(build(10 << 20).err(), Some(Refusal::Memory));
     let buffer = build(1 << 30).expect("it fits");
-    let parts = buffer.texels.iter().filter(|t| t.tag.kind() == 2).count();
-    assert!(parts * 20 < buffer.texels.len(), "nearly all parts would have the same lists, not {parts} others");
+    let view = buffer.tables.view();
+    let parts = view.texels().filter(|t| t.tag.kind() == 2).count();
+    assert!(parts * 20 < view.texels().count(), "nearly all parts would have the same lists, not {parts} others");
 }

@@ -1,0 +1,131 @@
+//! The memory of a light buffer: texels, lists and records one after the other, in huge pages where the system has them, as for fields.
+//!
+//! A look-up touches each of the three at a place that has nothing to do with the last one's. With pages of 4 KiB most of these also wait for the
+//! translation of an address.
+
+use vdf_distfield::Bytes;
+
+use super::{Entry, Texel, record::Record};
+
+/// A texel, or an entry of a list.
+type Pair = [u32; 2];
+
+/// All texels, entries and records.
+#[derive(Clone, Debug)]
+pub(super) struct Tables {
+    bytes: Bytes,
+    /// Where entries and records start, in bytes.
+    entries: usize,
+    records: usize,
+    end: usize,
+}
+
+/// The same, to look things up in.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    texels: &'a [Pair],
+    entries: &'a [Pair],
+    records: &'a [[f32; 16]],
+}
+
+/// The same, to be filled.
+pub(super) struct ViewMut<'a> {
+    texels: &'a mut [Pair],
+    entries: &'a mut [Pair],
+    records: &'a mut [[f32; 16]],
+}
+
+impl Tables {
+    /// For so many of each, which are all zero.
+    pub(super) fn zeroed(texels: usize, entries: usize, records: usize) -> Self {
+        let entries_at = texels * size_of::<Pair>();
+        // Each record in a cache line of its own.
+        let records_at = (entries_at + entries * size_of::<Pair>()).next_multiple_of(size_of::<Record>());
+        let end = records_at + records * size_of::<Record>();
+        Self { bytes: Bytes::zeroed(end), entries: entries_at, records: records_at, end }
+    }
+
+    pub(super) const fn bytes(&self) -> usize {
+        self.end
+    }
+
+    #[inline(always)]
+    pub(super) fn texel(&self, number: u32) -> Texel {
+        let texels: &[Pair] = bytemuck::cast_slice(&self.bytes[..self.entries]);
+        Texel::of(texels[number as usize])
+    }
+
+    #[inline(always)]
+    pub(super) fn view(&self) -> View<'_> {
+        View {
+            texels: bytemuck::cast_slice(&self.bytes[..self.entries]),
+            entries: bytemuck::cast_slice(&self.bytes[self.entries..self.records]),
+            records: bytemuck::cast_slice(&self.bytes[self.records..self.end]),
+        }
+    }
+
+    pub(super) fn view_mut(&mut self) -> ViewMut<'_> {
+        let (texels, rest) = self.bytes[..self.end].split_at_mut(self.entries);
+        let (entries, records) = rest.split_at_mut(self.records - self.entries);
+        ViewMut {
+            texels: bytemuck::cast_slice_mut(texels),
+            entries: bytemuck::cast_slice_mut(entries),
+            records: bytemuck::cast_slice_mut(records),
+        }
+    }
+}
+
+impl PartialEq for Tables {
+    fn eq(&self, other: &Self) -> bool {
+        (self.entries, self.records, &self.bytes[..]) == (other.entries, other.records, &other.bytes[..])
+    }
+}
+
+impl View<'_> {
+    #[inline(always)]
+    pub(super) fn texel(&self, number: usize) -> Texel {
+        Texel::of(self.texels[number])
+    }
+
+    #[inline(always)]
+    pub(super) fn entry(&self, number: usize) -> Entry {
+        Entry::of(self.entries[number])
+    }
+
+    #[inline(always)]
+    pub(super) fn record(&self, number: u32) -> Record {
+        Record(self.records[number as usize])
+    }
+
+    #[cfg(test)]
+    pub(super) fn texels(&self) -> impl Iterator<Item = Texel> {
+        self.texels.iter().map(|pair| Texel::of(*pair))
+    }
+
+    #[cfg(test)]
+    pub(super) fn entries(&self) -> impl Iterator<Item = Entry> {
+        self.entries.iter().map(|pair| Entry::of(*pair))
+    }
+}
+
+impl ViewMut<'_> {
+    /// Puts texels, one after the other from this one on.
+    pub(super) fn put_texels(&mut self, first: usize, texels: impl ExactSizeIterator<Item = Texel>) {
+        let end = first + texels.len();
+        for (to, texel) in self.texels[first..end].iter_mut().zip(texels) {
+            *to = texel.pair();
+        }
+    }
+
+    /// Puts entries, in the same way.
+    pub(super) fn put_entries(&mut self, first: usize, entries: impl ExactSizeIterator<Item = Entry>) {
+        let end = first + entries.len();
+        for (to, entry) in self.entries[first..end].iter_mut().zip(entries) {
+            *to = entry.pair();
+        }
+    }
+
+    pub(super) const fn records(&mut self) -> &mut [[f32; 16]] {
+        self.records
+    }
+}
