@@ -63,6 +63,24 @@ pub enum Bsdf {
         /// Of the coat; `None` is smooth.
         roughness: Option<Roughness>,
     },
+    /// A diffuse base under a coat of microfacets, as in Mitsuba's `pplastic` where light is not polarized; on the side of the normal.
+    PolarizedPlastic {
+        /// Index of refraction of the coat, divided by that outside; positive.
+        eta: f64,
+        /// Reflectance of the base, each channel in [0, 1].
+        diffuse: Texture,
+        /// What reflections of the coat are multiplied with.
+        specular: Texture,
+        /// Of the coat.
+        roughness: Roughness,
+    },
+    /// A sheet that lets light straight on, weakened: what polarizers and retarders are for light that is not polarized.
+    Filter {
+        /// What light is multiplied with, besides `share`.
+        transmittance: Texture,
+        /// In [0, 1]; half of the light is polarized the other way.
+        share: f32,
+    },
     /// A model for each side; neither transmits.
     TwoSided(Box<[Bsdf; 2]>),
     /// A mixture: the second model with this weight, else the first.
@@ -257,6 +275,7 @@ impl Bsdf {
             | Self::ThinDielectric { .. }
             | Self::PrincipledThin(_)
             | Self::Mask { .. }
+            | Self::Filter { .. }
             | Self::Null => true,
             Self::Principled(p) => p.transmits(),
             Self::Blend { of, .. } => of.iter().any(Self::transmits),
@@ -265,6 +284,7 @@ impl Bsdf {
             | Self::Diffuse { .. }
             | Self::Conductor { .. }
             | Self::Plastic { .. }
+            | Self::PolarizedPlastic { .. }
             | Self::TwoSided(_) => false,
         }
     }
@@ -272,7 +292,7 @@ impl Bsdf {
     /// Whether some light goes straight on to the other side.
     pub(crate) fn passes_straight(&self) -> bool {
         match self {
-            Self::ThinDielectric { .. } | Self::Mask { .. } | Self::Null => true,
+            Self::ThinDielectric { .. } | Self::Mask { .. } | Self::Filter { .. } | Self::Null => true,
             Self::Blend { of, .. } => of.iter().any(Self::passes_straight),
             Self::Perturbed { of, .. } => of.passes_straight(),
             _ => false,
@@ -285,6 +305,7 @@ impl Bsdf {
             Self::Conductor { roughness: Some(r), .. } | Self::Dielectric { roughness: Some(r), .. } => {
                 r.alpha_u != r.alpha_v
             }
+            Self::PolarizedPlastic { roughness, .. } => roughness.alpha_u != roughness.alpha_v,
             Self::TwoSided(of) | Self::Blend { of, .. } => of.iter().any(Self::has_directions),
             Self::Mask { of, .. } => of.has_directions(),
             Self::Perturbed { .. } => true,
@@ -305,6 +326,10 @@ impl Bsdf {
             }
             Self::ThinDielectric { reflectance, transmittance, .. } => vec![reflectance, transmittance],
             Self::Plastic { diffuse, specular, roughness, .. } => [vec![diffuse, specular], rough(roughness)].concat(),
+            Self::PolarizedPlastic { diffuse, specular, roughness, .. } => {
+                vec![diffuse, specular, &roughness.alpha_u, &roughness.alpha_v]
+            }
+            Self::Filter { transmittance, .. } => vec![transmittance],
             Self::TwoSided(of) => of.iter().flat_map(Self::textures).collect(),
             Self::Blend { weight, of } => std::iter::once(weight).chain(of.iter().flat_map(Self::textures)).collect(),
             Self::Mask { opacity, of } => std::iter::once(opacity).chain(of.textures()).collect(),

@@ -179,6 +179,12 @@ impl Sum {
                 self.doubles(&[p.eta]);
             }
             Bsdf::PrincipledThin(_) => self.words(&[12]),
+            Bsdf::PolarizedPlastic { eta, roughness, .. } => {
+                self.words(&[13]);
+                self.doubles(&[*eta]);
+                self.roughness(Some(roughness));
+            }
+            Bsdf::Filter { share, .. } => self.words(&[14, share.to_bits()]),
         }
         // Those of nested models once more, which does no harm.
         bsdf.textures().into_iter().for_each(|texture| self.texture(texture));
@@ -269,6 +275,11 @@ impl Sum {
             Phase::HenyeyGreenstein { g } => {
                 self.words(&[1]);
                 self.doubles(&[g]);
+            }
+            Phase::Rayleigh => self.words(&[2]),
+            Phase::TwoLobes { weight, g } => {
+                self.words(&[3]);
+                self.doubles(&[weight, g[0], g[1]]);
             }
         }
     }

@@ -150,6 +150,15 @@ pub enum Phase {
         /// Mean cosine.
         g: f64,
     },
+    /// Rayleigh's, 3/16π (1 + cos² θ): particles much smaller than the wavelength.
+    Rayleigh,
+    /// A mixture of two of Henyey–Greenstein: the second with this weight, else the first.
+    TwoLobes {
+        /// In [0, 1].
+        weight: f64,
+        /// Mean cosines in (−1, 1); 0 is isotropic.
+        g: [f64; 2],
+    },
 }
 
 /// A light source.

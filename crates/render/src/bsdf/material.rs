@@ -5,7 +5,10 @@ use std::f64::consts::PI;
 use glam::{DVec3, dvec3};
 use vdf_scene::{Bsdf, Perturbation, Principled, PrincipledThin, Rgb, Roughness, Texture, TexturePoint};
 
-use super::{fresnel, microfacet::Facets, perturbed::Perturbed, plastic::Coat, principled, principled_thin};
+use super::{
+    fresnel, microfacet::Facets, perturbed::Perturbed, plastic::Coat, polarized_plastic::PolarizedPlastic, principled,
+    principled_thin,
+};
 use crate::frame::sample_cosine_hemisphere;
 
 /// Smoother surfaces are drawn as rough as this, as in Mitsuba.
@@ -19,6 +22,8 @@ pub(crate) enum Material {
     Dielectric { eta: f64, reflectance: Texture, transmittance: Texture, roughness: Option<Roughness> },
     ThinDielectric { eta: f64, reflectance: Texture, transmittance: Texture },
     Plastic { coat: Coat, diffuse: Texture, specular: Texture, nonlinear: bool, roughness: Option<Roughness> },
+    PolarizedPlastic(Box<PolarizedPlastic>),
+    Filter { transmittance: Texture, share: f32 },
     TwoSided(Box<[Material; 2]>),
     Blend { weight: Texture, of: Box<[Material; 2]> },
     Mask { opacity: Texture, of: Box<Material> },
@@ -100,6 +105,12 @@ impl From<&Bsdf> for Material {
                 nonlinear: *nonlinear,
                 roughness: roughness.clone(),
             },
+            Bsdf::PolarizedPlastic { eta, diffuse, specular, roughness } => {
+                Self::PolarizedPlastic(Box::new(PolarizedPlastic::new(*eta, diffuse, specular, roughness)))
+            }
+            Bsdf::Filter { transmittance, share } => {
+                Self::Filter { transmittance: transmittance.clone(), share: *share }
+            }
             Bsdf::TwoSided(of) => Self::TwoSided(Box::new([(&of[0]).into(), (&of[1]).into()])),
             Bsdf::Blend { weight, of } => {
                 Self::Blend { weight: weight.clone(), of: Box::new([(&of[0]).into(), (&of[1]).into()]) }
@@ -118,7 +129,7 @@ impl From<&Bsdf> for Material {
     }
 }
 
-fn facets(roughness: &Roughness, at: &MaterialPoint) -> Facets {
+pub(super) fn facets(roughness: &Roughness, at: &MaterialPoint) -> Facets {
     let alpha = |t: &Texture| f64::from(t.luminance_at(&at.texture)).max(LEAST_ALPHA);
     Facets { kind: roughness.distribution, alpha: [alpha(&roughness.alpha_u), alpha(&roughness.alpha_v)] }
 }
@@ -131,7 +142,7 @@ impl Material {
     /// Whether some light may go straight through, which shadow rays have to follow.
     pub(crate) fn may_pass(&self) -> bool {
         match self {
-            Self::ThinDielectric { .. } | Self::Mask { .. } | Self::Null => true,
+            Self::ThinDielectric { .. } | Self::Mask { .. } | Self::Filter { .. } | Self::Null => true,
             Self::Blend { of, .. } => of.iter().any(Self::may_pass),
             Self::Perturbed(p) => p.of.may_pass(),
             _ => false,
@@ -142,11 +153,15 @@ impl Material {
     pub(crate) fn has_smooth_lobes(&self) -> bool {
         match self {
             Self::Conductor { roughness, .. } | Self::Dielectric { roughness, .. } => roughness.is_some(),
-            Self::ThinDielectric { .. } | Self::Null => false,
+            Self::ThinDielectric { .. } | Self::Filter { .. } | Self::Null => false,
             Self::TwoSided(of) | Self::Blend { of, .. } => of.iter().any(Self::has_smooth_lobes),
             Self::Mask { of, .. } => of.has_smooth_lobes(),
             Self::Perturbed(p) => p.of.has_smooth_lobes(),
-            Self::Diffuse { .. } | Self::Plastic { .. } | Self::Principled(_) | Self::PrincipledThin(_) => true,
+            Self::Diffuse { .. }
+            | Self::Plastic { .. }
+            | Self::PolarizedPlastic(_)
+            | Self::Principled(_)
+            | Self::PrincipledThin(_) => true,
         }
     }
 
@@ -175,6 +190,7 @@ impl Material {
                 of[0].passes(wi, at) * (1.0 - weight) + of[1].passes(wi, at) * weight
             }
             Self::Perturbed(p) => p.passes(wi, at),
+            Self::Filter { transmittance, share } => transmittance.at(&at.texture) * *share,
             Self::Null => Rgb::ONE,
             _ => Rgb::ZERO,
         }
@@ -231,9 +247,14 @@ impl Material {
                 (value * opacity, pdf * f64::from(opacity))
             }
             Self::Perturbed(p) => p.eval(wi, wo, at),
+            Self::PolarizedPlastic(p) => p.eval(wi, wo, at),
             Self::Principled(p) => principled::Lobes::new(p, at).eval(wi, wo),
             Self::PrincipledThin(p) => principled_thin::Sheet::new(p, at).eval(wi, wo),
-            Self::Conductor { .. } | Self::Dielectric { .. } | Self::ThinDielectric { .. } | Self::Null => BLACK,
+            Self::Conductor { .. }
+            | Self::Dielectric { .. }
+            | Self::ThinDielectric { .. }
+            | Self::Filter { .. }
+            | Self::Null => BLACK,
         }
     }
 
@@ -327,6 +348,13 @@ impl Material {
                 self.among_lobes(wi, sample, at)
             }
             Self::Perturbed(p) => p.sample(wi, at, choice, u),
+            Self::PolarizedPlastic(p) => {
+                if wi.z <= 0.0 {
+                    return None;
+                }
+                self.smooth(wi, p.sample(wi, at, choice, u), at, 1.0)
+            }
+            Self::Filter { transmittance, share } => Some(straight_on(wi, transmittance.at(&at.texture) * *share)),
             Self::Principled(p) => {
                 let (wo, eta) = principled::Lobes::new(p, at).sample(wi, choice, u)?;
                 self.smooth(wi, wo, at, eta)
@@ -372,7 +400,7 @@ fn thin_reflectance(cos: f64, eta: f64) -> f64 {
 }
 
 /// D·G/(4 cos θ_i), which is the BRDF times cosine without its Fresnel term; the density of `wo`, and the cosine at the facet.
-fn reflection(facets: &Facets, wi: DVec3, wo: DVec3) -> Option<(f64, f64, f64)> {
+pub(super) fn reflection(facets: &Facets, wi: DVec3, wo: DVec3) -> Option<(f64, f64, f64)> {
     if wi.z <= 0.0 || wo.z <= 0.0 {
         return None;
     }

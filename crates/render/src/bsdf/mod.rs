@@ -13,6 +13,7 @@ mod material;
 mod microfacet;
 mod perturbed;
 mod plastic;
+mod polarized_plastic;
 mod principled;
 mod principled_thin;
 #[cfg(test)]

@@ -112,6 +112,16 @@ fn all() -> Vec<(&'static str, Bsdf)> {
         ("sheet", Bsdf::ThinDielectric { eta: 1.5, reflectance: WHITE, transmittance: WHITE }),
         ("plastic", plastic(None, false)),
         ("matte plastic", plastic(rough(beckmann, 0.25, 0.25), true)),
+        (
+            "polarized plastic",
+            Bsdf::PolarizedPlastic {
+                eta: 1.49,
+                diffuse: Texture::Constant(Rgb::new(0.9, 0.5, 0.1)),
+                specular: WHITE,
+                roughness: Roughness { distribution: ggx, alpha_u: Texture::grey(0.15), alpha_v: Texture::grey(0.5) },
+            },
+        ),
+        ("polarizer", Bsdf::Filter { transmittance: Texture::grey(0.9), share: 0.5 }),
         ("two-sided", Bsdf::TwoSided(Box::new([plastic(rough(ggx, 0.3, 0.3), false), white.clone()]))),
         (
             "blend",

@@ -43,10 +43,10 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     // As in Mitsuba, the camera's scale moves the near plane, and the far one stays as far behind it.
     let (near_clip, far_clip) = (near_clip * scale.z, far_clip + near_clip * (scale.z - 1.0));
     let lens = lens(loader, &mut object, far_clip)?;
-    let Some(film) = object.at_most_one("film")? else {
-        return Err(object.error("no film", "add <film type=\"hdrfilm\"> to the sensor"));
+    let film = match object.at_most_one("film")? {
+        Some(film) => film::read(loader, film.object)?,
+        None => film::default(),
     };
-    let film = film::read(loader, film.object)?;
     let (sample_count, seed) = match object.at_most_one("sampler")? {
         Some(nested) => sampler(loader, nested.object)?,
         None => (4, 0),

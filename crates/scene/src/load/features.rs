@@ -23,6 +23,10 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
             "roughconductor",
             "plastic",
             "roughplastic",
+            "pplastic",
+            "polarizer",
+            "retarder",
+            "circular",
             "twosided",
             "mask",
             "blendbsdf",
@@ -34,18 +38,50 @@ pub(super) fn kinds(tag: &str) -> &'static [&'static str] {
         ],
         "emitter" => &["point", "constant", "area", "envmap", "spot", "projector", "directional"],
         "film" => &["hdrfilm"],
-        "integrator" => {
-            &["volpath", "volpathmis", "path", "direct", "prb", "prbvolpath", "prb_basic", "moment", "aov", "stokes"]
-        }
+        "integrator" => &[
+            "volpath",
+            "volpathmis",
+            "path",
+            "direct",
+            "prb",
+            "prbvolpath",
+            "prb_basic",
+            "ptracer",
+            "moment",
+            "aov",
+            "stokes",
+        ],
         "medium" => &["homogeneous", "heterogeneous"],
-        "phase" => &["isotropic", "hg"],
+        "phase" => &["isotropic", "hg", "rayleigh", "blendphase"],
         "rfilter" => &["box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"],
         "sampler" => &["independent", "stratified", "multijitter", "orthogonal", "ldsampler"],
         "sensor" => &["perspective", "thinlens", "orthographic"],
-        "shape" => {
-            &["obj", "ply", "serialized", "cube", "rectangle", "sphere", "disk", "cylinder", "shapegroup", "instance"]
-        }
-        "texture" => &["bitmap", "checkerboard", "mesh_attribute", "rawconstant"],
+        "shape" => &[
+            "obj",
+            "ply",
+            "serialized",
+            "cube",
+            "rectangle",
+            "sphere",
+            "disk",
+            "cylinder",
+            "shapegroup",
+            "instance",
+            "merge",
+        ],
+        "texture" => &[
+            "bitmap",
+            "checkerboard",
+            "mesh_attribute",
+            "rawconstant",
+            "uniform",
+            "srgb",
+            "d65",
+            "regular",
+            "irregular",
+            "blackbody",
+        ],
+        "spectrum" => &["uniform", "srgb", "d65", "regular", "irregular", "blackbody"],
         "volume" => &["gridvolume", "constvolume"],
         _ => &[],
     }
@@ -116,8 +152,7 @@ impl<'a> Features<'a> {
 fn feature(element: &Element) -> Option<String> {
     let kind = element.attribute("type").map(|kind| kind.value.as_str());
     match (element.tag.as_str(), kind) {
-        ("spectrum", Some(kind)) => Some(format!("spectrum {}", quoted(kind))),
-        (tag, Some(kind)) if element.is_object() && !kinds(tag).contains(&kind) => {
+        (tag, Some(kind)) if (element.is_object() || tag == "spectrum") && !kinds(tag).contains(&kind) => {
             Some(format!("{tag} {}", quoted(kind)))
         }
         _ => None,
@@ -127,12 +162,8 @@ fn feature(element: &Element) -> Option<String> {
 impl Feature<'_> {
     /// The error of a scene that lacks nothing but this.
     fn error(&self) -> SceneError {
-        let (element, kind) = (self.element, self.element.attribute("type"));
-        let colour = "write one number, or the colour as <rgb name=\"…\" value=\"red, green, blue\"/>";
-        match (element.tag.as_str(), kind) {
-            ("spectrum", Some(kind)) => kind.at.error(format!("{} is not supported", self.name), colour),
-            (tag, kind) => unsupported(element, kind.map_or("", |kind| &kind.value), kinds(tag)),
-        }
+        let kind = self.element.attribute("type").map_or("", |kind| &kind.value);
+        unsupported(self.element, kind, kinds(&self.element.tag))
     }
 }
 

@@ -7,6 +7,18 @@ use crate::{ComponentFormat, FilmSettings, PixelRect, ReconstructionFilter, Scen
 
 const MAX_FILM_SIZE: i64 = 1 << 16;
 
+/// What a sensor without a film has, as in Mitsuba.
+pub(super) fn default() -> FilmSettings {
+    let (width, height) = (768, 576);
+    FilmSettings {
+        width,
+        height,
+        crop: PixelRect { x0: 0, y0: 0, x1: width, y1: height },
+        filter: ReconstructionFilter::Gaussian { stddev: 0.5 },
+        component_format: ComponentFormat::Float32,
+    }
+}
+
 /// Reads the film.
 pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<FilmSettings, SceneError> {
     let mut object = Object::new(loader, element, features::kinds("film"))?;

@@ -34,7 +34,7 @@ fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> R
             "\"hide_emitters\" has no effect here: the camera sees the emitters",
         );
     }
-    if matches!(object.kind(), "path" | "direct" | "prb" | "prb_basic") && !loader.media.is_empty() {
+    if matches!(object.kind(), "path" | "direct" | "prb" | "prb_basic" | "ptracer") && !loader.media.is_empty() {
         let message = format!("{} ignores media in Mitsuba; vdf renders them, as volpath does", object.describe());
         loader.warn(&element.at, &message);
     }

@@ -81,6 +81,19 @@ fn read<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> Result<B
             nonlinear: o.boolean("nonlinear", false)?,
             roughness: if o.kind() == "plastic" { None } else { Some(roughness(loader, o, false)?) },
         },
+        "pplastic" => Bsdf::PolarizedPlastic {
+            eta: match (o.has("eta"), o.has("int_ior") || o.has("ext_ior")) {
+                (true, true) => {
+                    return Err(o.error("\"eta\" together with \"int_ior\" or \"ext_ior\"", "write one or the other"));
+                }
+                (true, false) => o.float_where("eta", 1.5, |v| v > 0.0, "positive")?,
+                _ => relative_index(o, "polypropylene")?,
+            },
+            diffuse: o.texture(loader, "diffuse_reflectance", 0.5)?,
+            specular: o.texture(loader, "specular_reflectance", 1.0)?,
+            roughness: roughness(loader, o, true)?,
+        },
+        "polarizer" | "retarder" | "circular" => filter(loader, o)?,
         "twosided" => two_sided(loader, o, depth)?,
         "mask" => {
             let opacity = o.texture(loader, "opacity", 0.5)?;
@@ -102,6 +115,26 @@ fn read<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> Result<B
     };
     object.finish()?;
     Ok(bsdf)
+}
+
+/// What turns or filters polarization, for light that has none: half of it passes a polarizer, and all a retarder.
+fn filter<'a>(loader: &Loader<'a>, o: &mut Object<'a>) -> Result<Bsdf, SceneError> {
+    let share = if o.kind() == "retarder" { 1.0 } else { 0.5 };
+    // Angles matter for polarized light alone.
+    match o.kind() {
+        "polarizer" => {
+            o.unbounded_texture(loader, "theta", 0.0)?;
+            o.boolean("polarizing", true)?;
+        }
+        "retarder" => {
+            o.unbounded_texture(loader, "theta", 0.0)?;
+            o.unbounded_texture(loader, "delta", 90.0)?;
+        }
+        _ => {
+            o.boolean("left_handed", false)?;
+        }
+    }
+    Ok(Bsdf::Filter { transmittance: o.texture(loader, "transmittance", 1.0)?, share })
 }
 
 fn perturbed<'a>(loader: &Loader<'a>, object: &mut Object<'a>, depth: usize) -> Result<Bsdf, SceneError> {
@@ -258,7 +291,7 @@ fn index(object: &mut Object<'_>, name: &'static str, default: &'static str) -> 
 }
 
 /// The complex index of refraction of a metal, relative to what is outside.
-fn metal(loader: &Loader<'_>, object: &mut Object<'_>) -> Result<[Rgb; 2], SceneError> {
+fn metal<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<[Rgb; 2], SceneError> {
     let material = object.string("material")?;
     let outside =
         if object.has("ext_eta") { object.float_where("ext_eta", 1.0, |v| v > 0.0, "positive")? as f32 } else { 1.0 };
@@ -282,8 +315,10 @@ fn metal(loader: &Loader<'_>, object: &mut Object<'_>) -> Result<[Rgb; 2], Scene
     match (object.has("eta"), object.has("k")) {
         // Mitsuba's own defaults, which are those of a mirror.
         (false, false) => Ok([Rgb::ZERO, Rgb::ONE]),
-        (true, true) => Ok([object.unbounded(loader, "eta")? / outside, object.unbounded(loader, "k")? / outside]),
-        _ => Err(object.error("only one of \"eta\" and \"k\"", "write both, or \"material\"")),
+        _ => {
+            let eta = object.unbounded(loader, "eta", 0.0)?;
+            Ok([eta / outside, object.unbounded(loader, "k", 1.0)? / outside])
+        }
     }
 }
 
@@ -298,10 +333,10 @@ fn roughness<'a>(loader: &Loader<'a>, object: &mut Object<'a>, directed: bool) -
         if object.has_any("alpha") {
             return Err(object.error("\"alpha\" together with \"alpha_u\" or \"alpha_v\"", "write one or the other"));
         }
-        let alpha_u = object.positive_texture(loader, "alpha_u", 0.1)?;
-        let alpha_v = object.positive_texture(loader, "alpha_v", 0.1)?;
+        let alpha_u = object.unbounded_texture(loader, "alpha_u", 0.1)?;
+        let alpha_v = object.unbounded_texture(loader, "alpha_v", 0.1)?;
         return Ok(Roughness { distribution, alpha_u, alpha_v });
     }
-    let alpha = object.positive_texture(loader, "alpha", 0.1)?;
+    let alpha = object.unbounded_texture(loader, "alpha", 0.1)?;
     Ok(Roughness { distribution, alpha_u: alpha.clone(), alpha_v: alpha })
 }

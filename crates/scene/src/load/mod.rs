@@ -12,6 +12,7 @@ mod metals;
 mod names;
 mod objects;
 mod parameters;
+mod plugins;
 mod properties;
 mod reader;
 mod search;
@@ -164,6 +165,11 @@ impl<'a> Loader<'a> {
                 "sensor" => sensors.push(element),
                 "integrator" => only_one(&mut integrator, element, "integrator")?,
                 "alias" => {}
+                "spectrum" if element.attribute("type").is_some() => {
+                    plugins::spectrum(&self, element, spectra::Weighed::ByDaylight)?;
+                }
+                // Whoever refers to it reads it.
+                "film" | "rfilter" if element.attribute("id").is_some() => {}
                 "sampler" => {
                     self.warn(
                         &element.at,

@@ -30,16 +30,26 @@ pub(super) fn foreign_name(name: &str) -> Option<(String, String)> {
     }
     let starts_lower = name.chars().next().is_some_and(|c| c.is_ascii_lowercase());
     if starts_lower && name.chars().any(|c| c.is_ascii_uppercase()) {
-        let mut snake = String::new();
-        for c in name.chars() {
-            if c.is_ascii_uppercase() {
-                snake.push('_');
-            }
-            snake.push(c.to_ascii_lowercase());
-        }
-        return Some((format!("\"{name}\" is spelled as in Mitsuba 0.6"), format!("write \"{snake}\"")));
+        return Some((format!("\"{name}\" is spelled as in Mitsuba 0.6"), format!("write \"{}\"", snake_case(name))));
     }
     None
+}
+
+/// `intIOR` as `int_ior`: the name of today for one of Mitsuba 0.6.
+pub(super) fn snake_case(name: &str) -> String {
+    let mut snake = String::with_capacity(name.len() + 4);
+    let mut last = None;
+    let mut in_capitals = false;
+    for c in name.chars() {
+        let begins = c.is_ascii_uppercase() && last.is_some_and(|l: char| l.is_ascii_lowercase());
+        in_capitals = begins || (in_capitals && c.is_ascii_uppercase());
+        if begins {
+            snake.push('_');
+        }
+        snake.push(if in_capitals { c.to_ascii_lowercase() } else { c });
+        last = Some(c);
+    }
+    snake
 }
 
 /// Longer names are not compared, and more names are not looked at: the cost of a comparison grows with the product of the lengths.
@@ -85,6 +95,8 @@ mod tests {
         assert!(foreign_name("method").is_some_and(|(_, help)| help.contains("option of the renderer")));
         assert_eq!(foreign_name("to_world"), None);
         assert_eq!(foreign_name("G"), None);
+        let upgraded = ["toWorld", "intIOR", "maxDepth", "B", "to_world"].map(snake_case);
+        assert_eq!(upgraded, ["to_world", "int_ior", "max_depth", "B", "to_world"]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use super::document::Element;
-use super::properties::Object;
+use super::properties::{Nested, Object};
 use super::{Loader, camera, features, textures, volumes};
 use crate::{Albedo, Emitter, Medium, MediumId, Phase};
 use crate::{Rgb, SceneError, Slide, Texture};
@@ -36,16 +36,39 @@ pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Resul
 
 /// A phase function.
 pub(super) fn phase<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Phase, SceneError> {
+    phase_within(loader, element, false)
+}
+
+fn phase_within<'a>(loader: &Loader<'a>, element: &'a Element, in_blend: bool) -> Result<Phase, SceneError> {
     let mut object = Object::new(loader, element, features::kinds("phase"))?;
-    let phase = if object.kind() == "hg" {
-        Phase::HenyeyGreenstein {
+    let phase = match object.kind() {
+        "hg" => Phase::HenyeyGreenstein {
             g: object.float_where("g", 0.8, |g| g > -1.0 && g < 1.0, "between -1 and 1, both excluded")?,
-        }
-    } else {
-        Phase::Isotropic
+        },
+        "rayleigh" => Phase::Rayleigh,
+        "blendphase" if in_blend => return Err(object.error("blends do not nest", "blend two lobes")),
+        "blendphase" => blend(loader, &mut object)?,
+        _ => Phase::Isotropic,
     };
     object.finish()?;
     Ok(phase)
+}
+
+/// Two lobes.
+fn blend<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Phase, SceneError> {
+    if !object.has("weight") {
+        return Err(object.error("no \"weight\"", "add <float name=\"weight\" …>; a volume is not supported there"));
+    }
+    let weight = object.float_where("weight", 0.5, |w| (0.0..=1.0).contains(&w), "in [0, 1]")?;
+    let [first, second] = object.nested("phase")[..] else {
+        return Err(object.error("it must hold two phase functions", "nest two"));
+    };
+    let mean_cosine = |nested: Nested<'a>| match phase_within(loader, nested.object, true)? {
+        Phase::Isotropic => Ok(0.0),
+        Phase::HenyeyGreenstein { g } => Ok(g),
+        _ => Err(nested.at.error("only isotropic and hg can be blended", "use one of these")),
+    };
+    Ok(Phase::TwoLobes { weight, g: [mean_cosine(first)?, mean_cosine(second)?] })
 }
 
 /// An emitter that stands by itself; `None` for an area light, which shines where a shape refers to it.
@@ -162,7 +185,7 @@ pub(super) fn area_emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Res
     Ok(radiance)
 }
 
-/// vdf chooses emitters uniformly.
+/// How often Mitsuba draws an emitter, not how bright it is; vdf chooses emitters uniformly.
 fn sampling_weight(object: &mut Object<'_>) -> Result<(), SceneError> {
-    object.float_where("sampling_weight", 1.0, |w| w == 1.0, "1: vdf chooses emitters uniformly").map(drop)
+    object.float_where("sampling_weight", 1.0, |w| w > 0.0, "positive").map(drop)
 }

@@ -8,7 +8,7 @@ use glam::{DMat4, DVec3};
 use super::Loader;
 use super::document::{Element, Place};
 use super::spectra::{self, Weighed};
-use super::{features, names, textures, transform};
+use super::{features, names, plugins, textures, transform};
 use crate::{Rgb, SceneError, Texture};
 
 /// The colour of the spectrum that is 1 at each wavelength, with the primaries of sRGB and its white, D65; as Mitsuba 3.9.1 has it.
@@ -45,7 +45,7 @@ impl<'a> Object<'a> {
         }
         let mut seen = HashSet::new();
         let mut children = Vec::new();
-        for child in &element.children {
+        for child in element.children.iter().filter(|child| child.tag != "alias") {
             let target = match child.tag.as_str() {
                 "ref" => Some(loader.ids.resolve(child)?),
                 _ if child.is_object() => Some(child),
@@ -188,7 +188,7 @@ impl<'a> Object<'a> {
     /// A reflectance or albedo, each channel in [0, 1]; `<float>` and a `<spectrum>` of one number make a grey.
     pub(super) fn reflectance(
         &mut self,
-        loader: &Loader<'_>,
+        loader: &Loader<'a>,
         name: &'static str,
         default: f32,
     ) -> Result<Rgb, SceneError> {
@@ -196,29 +196,38 @@ impl<'a> Object<'a> {
     }
 
     /// A colour whose channels are at least 0, as an index of refraction.
-    pub(super) fn unbounded(&mut self, loader: &Loader<'_>, name: &'static str) -> Result<Rgb, SceneError> {
-        self.colour(loader, name, 0.0, None, Weighed::ByDaylight)
+    pub(super) fn unbounded(
+        &mut self,
+        loader: &Loader<'a>,
+        name: &'static str,
+        default: f32,
+    ) -> Result<Rgb, SceneError> {
+        self.colour(loader, name, default, None, Weighed::ByDaylight)
     }
 
     /// What an emitter emits. `<float>` makes a grey. A `<spectrum>` of one number is as bright at each wavelength, which is not white:
     /// white is daylight, which is weaker in red.
-    pub(super) fn emission(&mut self, loader: &Loader<'_>, name: &'static str) -> Result<Rgb, SceneError> {
+    pub(super) fn emission(&mut self, loader: &Loader<'a>, name: &'static str) -> Result<Rgb, SceneError> {
         self.colour(loader, name, 1.0, None, Weighed::Equally)
     }
 
     fn colour(
         &mut self,
-        loader: &Loader<'_>,
+        loader: &Loader<'a>,
         name: &'static str,
         default: f32,
         most: Option<f64>,
         weighed: Weighed,
     ) -> Result<Rgb, SceneError> {
-        let Some(element) = self.property(name, &["rgb", "float", "integer", "spectrum"])? else {
-            return Ok(Rgb::splat(default));
+        let nested = self.texture_element(name)?;
+        let element = match nested {
+            Some(nested) => Some(nested),
+            None => self.property(name, &["rgb", "float", "integer", "spectrum"])?,
         };
+        let Some(element) = element else { return Ok(Rgb::splat(default)) };
         let values = match element.tag.as_str() {
             "rgb" => rgb(element)?,
+            "texture" => plugins::spectrum(loader, element, weighed)?,
             "spectrum" => spectrum(loader, element, weighed)?,
             _ => DVec3::splat(number(element)?),
         };
@@ -263,20 +272,6 @@ impl<'a> Object<'a> {
             Some(nested) => textures::read(loader, nested),
             None => self.colour(loader, name, default, None, Weighed::ByDaylight).map(Texture::Constant),
         }
-    }
-
-    /// As [`Object::texture`], but positive: a `<float>` of 0 is an error.
-    pub(super) fn positive_texture(
-        &mut self,
-        loader: &Loader<'a>,
-        name: &'static str,
-        default: f32,
-    ) -> Result<Texture, SceneError> {
-        let texture = self.texture(loader, name, default)?;
-        if texture.constant().is_some_and(|c| c.min_element() <= 0.0) {
-            return Err(self.place_of(name).error(format!("\"{name}\" is 0"), "it must be positive and at most 1"));
-        }
-        Ok(texture)
     }
 
     /// The texture of that name, nested or referred to.
@@ -357,7 +352,7 @@ impl<'a> Object<'a> {
     /// An extinction coefficient: a number or a colour, each channel finite and at least 0.
     pub(super) fn extinction(
         &mut self,
-        loader: &Loader<'_>,
+        loader: &Loader<'a>,
         name: &'static str,
         default: f64,
     ) -> Result<DVec3, SceneError> {
@@ -377,7 +372,7 @@ impl<'a> Object<'a> {
             return Err(element.at.error(message, "each channel must be finite and at least 0"));
         }
         let most = value.max_element();
-        if most > 1.0 && element.tag == "rgb" {
+        if most > 1.0 && element.tag == "rgb" && self.kind != "constvolume" {
             return Err(element.at.error(
                 format!("\"{name}\" as <rgb> is {most}, more than 1"),
                 format!("Mitsuba refuses that: write <float name=\"{name}\" …>, or use \"scale\""),
@@ -450,7 +445,7 @@ impl<'a> Object<'a> {
     }
 }
 
-fn number(element: &Element) -> Result<f64, SceneError> {
+pub(super) fn number(element: &Element) -> Result<f64, SceneError> {
     if element.tag == "integer" {
         #[allow(clippy::cast_precision_loss, reason = "an integer where a number is asked for is rounded to one")]
         return parse_integer(element).map(|i| i as f64);
@@ -459,7 +454,10 @@ fn number(element: &Element) -> Result<f64, SceneError> {
 }
 
 /// A spectrum as a colour: one number, the same at each wavelength; a list of wavelengths with values; or such a list in a file.
-fn spectrum(loader: &Loader<'_>, element: &Element, weighed: Weighed) -> Result<DVec3, SceneError> {
+fn spectrum<'a>(loader: &Loader<'a>, element: &'a Element, weighed: Weighed) -> Result<DVec3, SceneError> {
+    if element.attribute("type").is_some() {
+        return plugins::spectrum(loader, element, weighed);
+    }
     let text = match element.attribute("filename") {
         None => element.require("value")?.to_owned(),
         Some(file) => spectrum_file(loader, &file.value, element)?,

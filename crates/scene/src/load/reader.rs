@@ -74,14 +74,16 @@ impl Reader<'_> {
             at.error(format!("XML: {}", without_position(&e.to_string())), "")
         })?;
         self.open_files.push(path.to_path_buf());
-        let root = self.element(document.root_element(), &lines, 0)?;
+        let mut root = self.element(document.root_element(), &lines, 0)?;
         self.open_files.pop();
         if root.tag != "scene" {
             return Err(root
                 .at
                 .error(format!("the root element is <{}>", root.tag), "it must be <scene version=\"3.0.0\">"));
         }
-        check_version(&root)?;
+        if check_version(&root)? {
+            upgrade(&mut root);
+        }
         Ok(root)
     }
 
@@ -119,7 +121,6 @@ impl Reader<'_> {
                 }
             }
             if child.is_element() {
-                // A spectrum with a type is refused as a whole, with what it holds.
                 let may_hold = match element.tag.as_str() {
                     "scene" | "transform" => true,
                     "spectrum" => element.attribute("type").is_some(),
@@ -147,10 +148,11 @@ impl Reader<'_> {
         parent: &mut Element,
     ) -> Result<(), SceneError> {
         let child = self.element(node, lines, depth + 1)?;
-        if matches!(child.tag.as_str(), "default" | "include" | "alias" | "path") && parent.tag != "scene" {
-            return Err(child
-                .at
-                .error(format!("<{}> inside <{}>", child.tag, parent.tag), "it must stand directly inside <scene>"));
+        if matches!(child.tag.as_str(), "default" | "include" | "alias" | "path")
+            && !(parent.tag == "scene" || parent.is_object())
+        {
+            let help = "it must stand directly inside <scene> or an object";
+            return Err(child.at.error(format!("<{}> inside <{}>", child.tag, parent.tag), help));
         }
         match child.tag.as_str() {
             "default" => self.parameters.default(child.require("name")?, child.require("value")?, &child.at)?,
@@ -230,7 +232,7 @@ fn allowed_attributes(tag: &str, at: &Place) -> Result<&'static [&'static str], 
         "shape" => &["type", "id", "name"],
         _ if OBJECT_TAGS.contains(&tag) => &["type", "id", "name"],
         "boolean" | "integer" | "float" | "string" | "rgb" => &["name", "value"],
-        "spectrum" => &["name", "value", "type", "filename"],
+        "spectrum" => &["name", "value", "type", "filename", "id"],
         "vector" | "point" => &["name", "value", "x", "y", "z"],
         "transform" => &["name"],
         "translate" | "scale" => &["x", "y", "z", "value"],
@@ -250,16 +252,27 @@ fn allowed_attributes(tag: &str, at: &Place) -> Result<&'static [&'static str], 
     })
 }
 
-fn check_version(root: &Element) -> Result<(), SceneError> {
+/// Whether the file is from before version 2.
+fn check_version(root: &Element) -> Result<bool, SceneError> {
     let version = root.require("version")?;
     let parts: Vec<Option<u32>> = version.split('.').map(|p| p.parse().ok()).collect();
     match parts.as_slice() {
-        [Some(major), Some(_), Some(_)] if *major >= 2 => Ok(()),
-        [Some(_), Some(_), Some(_)] => Err(root.at.error(
-            format!("scene version {version} is too old"),
-            "2.0.0 or later is supported; Mitsuba 3 rewrites old scenes when it loads them. Names are now snake_case, and sigma_s, sigma_a are sigma_t, albedo",
-        )),
+        [Some(major), Some(_), Some(_)] => Ok(*major < 2),
         _ => Err(root.at.error(format!("\"{version}\" is not a version"), "write version=\"3.0.0\"")),
+    }
+}
+
+/// Gives what a file from before version 2 names in camelCase its name of today, as Mitsuba 3 does. What has more than another name is left to be refused.
+fn upgrade(element: &mut Element) {
+    let is_diffuse = element.tag == "bsdf" && element.attribute("type").is_some_and(|kind| kind.value == "diffuse");
+    for child in &mut element.children {
+        if let Some(name) = child.attributes.iter_mut().find(|a| a.name == "name") {
+            name.value = names::snake_case(&name.value);
+            if is_diffuse && name.value == "diffuse_reflectance" {
+                "reflectance".clone_into(&mut name.value);
+            }
+        }
+        upgrade(child);
     }
 }
 

@@ -105,7 +105,8 @@ const CIE: [[f64; 4]; 95] = [
     [1.251e-06, 4.518e-07, 0.0, 0.60923],
 ];
 
-const FIRST: f64 = 360.0;
+pub(super) const FIRST: f64 = 360.0;
+pub(super) const LAST: f64 = 830.0;
 const STEP: f64 = 5.0;
 
 /// Whether a spectrum is what a surface does to light, or light itself.
@@ -118,8 +119,7 @@ pub(super) enum Weighed {
 /// The colour of a spectrum given as wavelengths in nm, growing, with values. Cost: one step a nanometre.
 pub(super) fn colour(spectrum: &[(f64, f64)], weighed: Weighed) -> DVec3 {
     let (mut sum, mut norm) = (DVec3::ZERO, 0.0);
-    let last = FIRST + STEP * (CIE.len() - 1) as f64;
-    let nanometres = (last - FIRST) as u32;
+    let nanometres = (LAST - FIRST) as u32;
     for i in 0..=nanometres {
         let wavelength = FIRST + f64::from(i);
         let [x, y, z, daylight] = between(&CIE, (wavelength - FIRST) / STEP);

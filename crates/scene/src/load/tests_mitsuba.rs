@@ -270,21 +270,25 @@ fn all_features_that_a_scene_lacks_are_named_at_once() {
          <shape type='hair'><string name='filename' value='none.hair'/><bsdf type='twosided'><bsdf type='measured'>\
          <texture type='wood' name='diffuse_reflectance'/></bsdf></bsdf></shape>\n\
          <shape type='hair'><string name='filename' value='none.hair'/></shape>\n\
-         <bsdf type='diffuse' id='b'><spectrum name='reflectance' type='d65'><float name='scale' value='1'/></spectrum></bsdf>\n\
+         <bsdf type='diffuse' id='b'><spectrum name='reflectance' type='laser'><float name='scale' value='1'/></spectrum></bsdf>\n\
          <phase type='sggx'/>";
     let list = "6 features of this scene are not supported: emitter \"sunsky\" (s.xml:3), shape \"hair\" (s.xml:4 and 1 more), \
                 bsdf \"measured\" (s.xml:4), texture \"wood\" (s.xml:4), \
-                spectrum \"d65\" (s.xml:6), phase \"sggx\" (s.xml:7)\n";
+                spectrum \"laser\" (s.xml:6), phase \"sggx\" (s.xml:7)\n";
     refused(body, "3:1", list);
     refused(
         body,
         "3:1",
-        "principled, principledthin, null; emitter point, constant, area, envmap, spot, projector, directional; phase isotropic, hg; shape obj",
+        "principled, principledthin, null; emitter point, constant, area, envmap, spot, projector, directional; phase isotropic, hg, rayleigh, blendphase; shape obj",
     );
     // One alone has its own message, before any file is looked for.
     let hair = "<shape type='obj'><string name='filename' value='none.obj'/></shape><shape type='hair'/>";
     refused(hair, "3:76", "shape type \"hair\" is not supported\n  help: supported: obj");
-    refused("<bsdf type='diffuse'><spectrum name='reflectance' type='d65'/></bsdf>", "3:51", "spectrum \"d65\" is not");
+    refused(
+        "<bsdf type='diffuse'><spectrum name='reflectance' type='laser'/></bsdf>",
+        "3:51",
+        "spectrum type \"laser\" is not",
+    );
     // A camera that is not used needs nothing.
     let cameras = format!("{LIGHT}<sensor type='irradiancemeter'/><sensor type='perspective'>{FILM}</sensor></scene>");
     let text = format!("{HEAD}{cameras}");
@@ -370,7 +374,64 @@ fn materials_have_mitsubas_defaults() {
     refused(&material("Cooper"), "3:24", "\"Cooper\" is not a metal");
     refused("<bsdf type='dielectric'><string name='int_ior' value='watre'/></bsdf>", "3:25", "did you mean \"water\"");
     refused("<bsdf type='twosided'><bsdf type='dielectric'/></bsdf>", "3:23", "transmits light");
-    refused("<bsdf type='roughconductor'><float name='alpha' value='0'/></bsdf>", "3:29", "is 0");
+    let alpha = |value: &str| match bsdf(&format!(
+        "<bsdf type='roughconductor'><float name='alpha' value='{value}'/></bsdf>"
+    )) {
+        Bsdf::Conductor { roughness: Some(rough), .. } => rough.alpha_u,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!([alpha("0"), alpha("1.5")], [Texture::grey(0.0), Texture::grey(1.5)]);
+    let Bsdf::Conductor { k, .. } = bsdf("<bsdf type='conductor'><rgb name='eta' value='1.5'/></bsdf>") else {
+        panic!("a metal without k")
+    };
+    assert_eq!(k, Vec3::ONE);
+    for (kind, share) in [("polarizer", 0.5), ("circular", 0.5), ("retarder", 1.0)] {
+        assert_eq!(bsdf(&format!("<bsdf type='{kind}'/>")), Bsdf::Filter { transmittance: Texture::grey(1.0), share });
+    }
+    assert!(
+        matches!(bsdf("<bsdf type='pplastic'/>"), Bsdf::PolarizedPlastic { eta, .. } if (eta - 1.49 / 1.000_277).abs() < 1e-12)
+    );
     refused("<bsdf type='mask'/>", "3:1", "must hold one BSDF");
     refused("<bsdf type='blendbsdf'><bsdf type='diffuse'/></bsdf>", "3:1", "must hold two");
+}
+
+/// Spectra with a type, nested or as a texture; those over wavelengths have the colour of the same values written in line.
+#[test]
+fn spectra_may_be_objects() {
+    let surface = |text: &str| {
+        let loaded = load(&format!("<shape type='cube'><bsdf type='diffuse'>{text}</bsdf></shape>"));
+        match &loaded.surfaces[0].bsdf {
+            Bsdf::Lambertian { front, .. } => *front,
+            other => panic!("{other:?}"),
+        }
+    };
+    let colour = "<rgb name='color' value='0.1, 0.2, 0.3'/>";
+    for kind in ["spectrum", "texture"] {
+        let of =
+            |name: &str, inner: &str| surface(&format!("<{kind} name='reflectance' type='{name}'>{inner}</{kind}>"));
+        assert_eq!(of("uniform", "<float name='value' value='0.25'/>"), Vec3::splat(0.25));
+        assert_eq!(of("srgb", colour), Vec3::new(0.1, 0.2, 0.3));
+        assert_eq!(of("d65", "<float name='scale' value='0.5'/>"), Vec3::splat(0.5));
+        let steps = "<float name='wavelength_min' value='400'/><float name='wavelength_max' value='700'/><string name='values' value='0.1, 0.5, 0.9, 0.3'/>";
+        let written = surface("<spectrum name='reflectance' value='400:0.1, 500:0.5, 600:0.9, 700:0.3'/>");
+        assert_eq!(of("regular", steps), written);
+        let listed =
+            "<string name='wavelengths' value='400, 500 600,700'/><string name='values' value='0.1 0.5 0.9, 0.3'/>";
+        assert_eq!(of("irregular", listed), written);
+    }
+    // A star of 6500 K is nearly as white as daylight, a lamp of 2800 K is red; ∫ȳ B over ∫ȳ in W/(m² sr nm).
+    let light = |temperature: &str| {
+        let radiance = format!(
+            "<spectrum type='blackbody' name='radiance'><float name='temperature' value='{temperature}'/></spectrum>"
+        );
+        load(&format!("<shape type='sphere'><emitter type='area'>{radiance}</emitter></shape>")).surfaces[0]
+            .radiance
+            .unwrap()
+    };
+    let (star, lamp) = (light("6500"), light("2800"));
+    assert!((star / star.y - 1.0).abs().max_element() < 0.06, "{star}");
+    assert!(lamp.x > 2.0 * lamp.y && lamp.y > 3.0 * lamp.z, "{lamp}");
+    // Planck's law at 555 nm: 1.1910e20 / 555⁵ / (e^(14387769/(555 · 6500)) − 1) = 42,706; it is 1 % less over all that is seen.
+    assert!((crate::luminance(star) / 42_706.0 - 1.0).abs() < 0.03, "{star}");
+    refused("<bsdf type='diffuse'><spectrum name='reflectance' type='regular'/></bsdf>", "3:22", "no \"values\"");
 }

@@ -10,7 +10,8 @@ use image::{DynamicImage, ImageReader};
 
 use super::document::{Element, Place};
 use super::properties::Object;
-use super::{Loader, features, transform};
+use super::spectra::Weighed;
+use super::{Loader, features, plugins, transform};
 use crate::{Pixels, Rgb, SceneError, Texture, TextureFilter, UvTransform, Wrap};
 
 /// All pictures of a scene have at most this many pixels together; each takes twelve bytes.
@@ -47,6 +48,10 @@ fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> R
             let value = object.raw("value")?;
             let missing = || object.error("no value", "add <float name=\"value\" …>, or a <vector>");
             Texture::Constant(value.ok_or_else(missing)?)
+        }
+        "uniform" | "srgb" | "d65" | "regular" | "irregular" | "blackbody" => {
+            let colour = plugins::spectrum(loader, element, Weighed::ByDaylight)?;
+            return Ok(Texture::Constant(colour.as_vec3()));
         }
         _ => {
             let to_uv = uv_transform(loader, &mut object)?;

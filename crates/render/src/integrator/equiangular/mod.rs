@@ -128,6 +128,10 @@ impl<const NODES: usize> Equiangular<NODES> {
             total += arc.area();
             arcs.push(arc);
         }
+        // These have a minimum that may lie between two nodes.
+        if stretches.iter().any(|s| matches!(s.phase, Phase::Rayleigh | Phase::TwoLobes { .. })) {
+            contrast = f64::INFINITY;
+        }
         // Where there is another medium on the way to the light, the way's transmittance is misjudged.
         contrast = contrast.max((densest * (farthest - nearest)).exp());
         // A maximum passes over what is no number.
@@ -242,6 +246,11 @@ fn phase_at_cosine(phase: Phase, cos: f64) -> f64 {
             let (a, cos) = (g.abs(), if g < 0.0 { -cos } else { cos });
             let d = (1.0 - a) * (1.0 - a) + 2.0 * a * (1.0 - cos.min(1.0));
             0.25 / PI * (1.0 - a) * (1.0 + a) / (d * d.sqrt())
+        }
+        Phase::Rayleigh => 3.0 / (16.0 * PI) * (1.0 + cos * cos),
+        Phase::TwoLobes { weight, g } => {
+            let [first, second] = g.map(|g| phase_at_cosine(Phase::HenyeyGreenstein { g }, cos));
+            (1.0 - weight) * first + weight * second
         }
     }
 }

@@ -154,11 +154,13 @@ fn key(Medium { sigma_t, albedo, phase }: &Medium) -> Vec<u64> {
         Albedo::Constant(albedo) => key.extend(albedo.to_array().map(|x| u64::from(x.to_bits()))),
         Albedo::Grid(of) => volume(&mut key, of),
     }
-    // No mean cosine has the bits of 2.
-    key.push(match phase {
-        Phase::Isotropic => 2.0_f64.to_bits(),
-        Phase::HenyeyGreenstein { g } => g.to_bits(),
-    });
+    // No mean cosine has the bits of 2 or more.
+    match phase {
+        Phase::Isotropic => key.push(2.0_f64.to_bits()),
+        Phase::HenyeyGreenstein { g } => key.push(g.to_bits()),
+        Phase::Rayleigh => key.push(3.0_f64.to_bits()),
+        Phase::TwoLobes { weight, g } => key.extend([4.0, *weight, g[0], g[1]].map(f64::to_bits)),
+    }
     key
 }
 

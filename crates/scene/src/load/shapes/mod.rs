@@ -35,6 +35,16 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let mut object = Object::new(loader, element, features::kinds("shape"))?;
     match object.kind() {
         "shapegroup" => Ok(()),
+        // Mitsuba joins the meshes in it into one; they look the same.
+        "merge" => {
+            for member in object.nested("shape") {
+                if member.object.attribute("type").is_some_and(|kind| kind.value == "merge") {
+                    return Err(member.at.error("a merge inside of a merge", "put the shapes into one"));
+                }
+                read(loader, member.object)?;
+            }
+            object.finish()
+        }
         "instance" => {
             let to_world = object.world_transform(loader)?;
             let Some(group) = object.at_most_one("shape")? else {
@@ -62,11 +72,13 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
 /// Reads a shape that is no instance, and moves it by `outer` when it is where its own transform puts it.
 fn read_at<'a>(loader: &mut Loader<'a>, element: &'a Element, outer: DMat4) -> Result<(), SceneError> {
     let mut object = Object::new(loader, element, features::kinds("shape"))?;
-    if matches!(object.kind(), "shapegroup" | "instance") {
+    if matches!(object.kind(), "shapegroup" | "instance" | "merge") {
         return Err(object.error("groups and instances do not nest", "put the shapes themselves into the group"));
     }
     let to_world = outer * object.world_transform(loader)?;
     let flip = object.boolean("flip_normals", false)?;
+    // Of derivatives, which are not taken here.
+    object.float("silhouette_sampling_weight")?;
     let is_mirrored = to_world.determinant() < 0.0;
     let curved = curved::read(&mut object, to_world, flip)?;
     let placed = if curved.is_none() {
