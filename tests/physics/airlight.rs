@@ -57,7 +57,7 @@ fn in_unbounded_fog() {
 fn in_boxes_of_fog() {
     for way in WAYS {
         let mut check = Check::by("single scattering, bounded", way);
-        for phase in PHASES {
+        for phase in [PHASES[0], PHASES[1], Phase::Rayleigh, Phase::TwoLobes { weight: 0.3, g: [0.9, -0.6] }] {
             let fog = |min: Vec3, max: Vec3, sigma_t| Fog { min, max, sigma_t, albedo: 0.8, phase };
             let around = fog(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.5, 4.0), 0.7);
             let ahead = fog(vec3(-1.0, -1.5, 1.0), vec3(1.0, 1.0, 4.0), 0.9);

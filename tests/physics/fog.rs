@@ -55,9 +55,12 @@ impl Fog {
 
     /// The phase function by the textbook's formula [Henyey1941].
     fn phase(&self, cos_theta: f64) -> f64 {
+        let lobe = |g: f64| 0.25 / PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos_theta).powf(1.5);
         match self.phase {
             Phase::Isotropic => 0.25 / PI,
-            Phase::HenyeyGreenstein { g } => 0.25 / PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos_theta).powf(1.5),
+            Phase::HenyeyGreenstein { g } => lobe(g),
+            Phase::Rayleigh => 3.0 / 16.0 / PI * (1.0 + cos_theta * cos_theta),
+            Phase::TwoLobes { weight, g: [first, second] } => (1.0 - weight) * lobe(first) + weight * lobe(second),
         }
     }
 }
