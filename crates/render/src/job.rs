@@ -23,8 +23,12 @@ pub struct Job<'a> {
 }
 
 /// Follows the paths of a job; one for each thread or for all of them.
-pub struct PathTracer<'a, R> {
-    tracer: Tracer<'a, R>,
+///
+/// Integrators are compiled here, once for those who listen and once for those who don't, and not again by each crate that follows paths.
+pub struct PathTracer<'a> {
+    tracer: Tracer<'a, NoRecorder>,
+    /// Who traces instead if somebody listens.
+    recording: Option<Tracer<'a, &'a dyn Recorder>>,
     camera: Camera,
     filter: PixelFilter,
     integrator: Integrator,
@@ -90,38 +94,52 @@ impl<'a> Job<'a> {
     /// Who follows the paths, asking the scene's own provers. A path that goes on and on asks `progress` whether to stop; then its radiance
     /// is not to be used.
     #[must_use]
-    pub fn tracer(&self, progress: &'a dyn Progress) -> PathTracer<'a, NoRecorder> {
-        self.tracer_with(self.prepared.visibility().segment_first(self.options.segment_first), progress)
+    pub fn tracer(&self, progress: &'a dyn Progress) -> PathTracer<'a> {
+        self.path_tracer(None, progress)
     }
 
     /// Who follows the paths and lets `recorder` hear of every visibility query.
     #[must_use]
-    pub fn recording_tracer<R: Recorder>(&self, recorder: R, progress: &'a dyn Progress) -> PathTracer<'a, R> {
-        self.tracer_with(self.prepared.visibility().recorded(recorder), progress)
+    pub fn recording_tracer<'b>(&self, recorder: &'b dyn Recorder, progress: &'b dyn Progress) -> PathTracer<'b>
+    where
+        'a: 'b,
+    {
+        self.path_tracer(Some(recorder), progress)
     }
 
-    fn tracer_with<R: Recorder>(&self, visibility: Visibility<'a, R>, progress: &'a dyn Progress) -> PathTracer<'a, R> {
-        let scene = self.prepared.scene();
+    fn path_tracer<'b>(&self, recorder: Option<&'b dyn Recorder>, progress: &'b dyn Progress) -> PathTracer<'b>
+    where
+        'a: 'b,
+    {
+        let visibility = || self.prepared.visibility();
         PathTracer {
-            tracer: Tracer {
-                world: self.prepared.world(),
-                visibility,
-                settings: scene.integrator,
-                transmittance: self.options.transmittance,
-                roulette: self.options.roulette,
-                estimator: self.options.estimator,
-                progress,
-            },
+            tracer: self.tracer_with(visibility().segment_first(self.options.segment_first), progress),
+            recording: recorder.map(|recorder| self.tracer_with(visibility().recorded(recorder), progress)),
             camera: self.camera,
-            filter: PixelFilter::new(&scene.film.filter),
+            filter: PixelFilter::new(&self.prepared.scene().film.filter),
             integrator: self.options.integrator,
             sampler: self.options.sampler,
             seed: self.seed,
         }
     }
+
+    fn tracer_with<'b, R>(&self, visibility: Visibility<'b, R>, progress: &'b dyn Progress) -> Tracer<'b, R>
+    where
+        'a: 'b,
+    {
+        Tracer {
+            world: self.prepared.world(),
+            visibility,
+            settings: self.prepared.scene().integrator,
+            transmittance: self.options.transmittance,
+            roulette: self.options.roulette,
+            estimator: self.options.estimator,
+            progress,
+        }
+    }
 }
 
-impl<R> std::fmt::Debug for PathTracer<'_, R> {
+impl std::fmt::Debug for PathTracer<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("PathTracer")
             .field("integrator", &self.integrator)
@@ -130,7 +148,7 @@ impl<R> std::fmt::Debug for PathTracer<'_, R> {
     }
 }
 
-impl<R: Recorder> PathTracer<'_, R> {
+impl PathTracer<'_> {
     /// What the camera ray of a sample meets first.
     pub(crate) fn feature(&self, x: u32, y: u32, sample: u32) -> Option<Feature> {
         let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
@@ -154,11 +172,14 @@ impl<R: Recorder> PathTracer<'_, R> {
     }
 
     /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.
-    #[inline]
     pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> (Rgb, f64) {
         let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
         let FilterSample { offset: [dx, dy], weight } = self.filter.sample(&mut sampler);
         let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, &mut sampler);
-        (self.tracer.radiance(self.integrator, ray, &mut sampler, counters), weight)
+        let radiance = match &self.recording {
+            None => self.tracer.radiance(self.integrator, ray, &mut sampler, counters),
+            Some(recording) => recording.radiance(self.integrator, ray, &mut sampler, counters),
+        };
+        (radiance, weight)
     }
 }

@@ -13,7 +13,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use vdf_image::Image;
 use vdf_scene::PixelRect;
-use vdf_visibility::{Counters, NoRecorder};
+use vdf_visibility::Counters;
 
 use crate::{
     Film, FilmError, FilmOrigin, Picture, Progress, RenderError, Statistics,
@@ -215,7 +215,7 @@ fn render_tile<'a>(
 /// The sum of what `make` makes of each sample: of its value, its number, and the counters before and after it.
 #[inline]
 fn sum_pixel<V: Copy + Add<Output = V>>(
-    tracer: &PathTracer<'_, NoRecorder>,
+    tracer: &PathTracer<'_>,
     (x, y): (u32, u32),
     samples: Range<u32>,
     progress: &dyn Progress,

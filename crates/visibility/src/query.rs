@@ -50,6 +50,19 @@ impl Recorder for NoRecorder {
     fn record(&self, _: &ShadowQuery, _: bool) {}
 }
 
+/// So that an integrator is compiled once for all who listen.
+impl Recorder for &dyn Recorder {
+    #[inline]
+    fn begins(&self) {
+        (**self).begins();
+    }
+
+    #[inline]
+    fn record(&self, query: &ShadowQuery, unoccluded: bool) {
+        (**self).record(query, unoccluded);
+    }
+}
+
 /// Answers all visibility questions of an integrator.
 #[derive(Debug)]
 pub struct Visibility<'a, R = NoRecorder> {

@@ -89,7 +89,7 @@ struct LoggedPath {
     queries: usize,
 }
 
-impl Recorder for &TileLog {
+impl Recorder for TileLog {
     #[inline]
     fn record(&self, query: &ShadowQuery, unoccluded: bool) {
         let mut log = self.0.borrow_mut();

@@ -341,7 +341,7 @@ fn median(values: &mut [f64]) -> f64 {
 #[derive(Default)]
 struct Log(RefCell<Vec<ShadowQuery>>);
 
-impl Recorder for &Log {
+impl Recorder for Log {
     fn record(&self, query: &ShadowQuery, _: bool) {
         self.0.borrow_mut().push(*query);
     }

@@ -29,7 +29,7 @@ struct Stopwatch {
     spent: Cell<Duration>,
 }
 
-impl Recorder for &Stopwatch {
+impl Recorder for Stopwatch {
     #[inline]
     fn begins(&self) {
         self.since.set(Instant::now());
@@ -44,18 +44,14 @@ impl Recorder for &Stopwatch {
 /// Follows all paths of the job on this thread.
 pub(super) fn timed_render(job: &Job<'_>, timers: bool, progress: &dyn Progress) -> Result<TimedRender, RenderError> {
     if !timers {
-        return follow(job, &job.recording_tracer(NoRecorder, progress), progress);
+        return follow(job, &job.recording_tracer(&NoRecorder, progress), progress);
     }
     let watch = Stopwatch { since: Cell::new(Instant::now()), spent: Cell::default() };
     let rendered = follow(job, &job.recording_tracer(&watch, progress), progress)?;
     Ok(TimedRender { t_query: watch.spent.get().as_secs_f64(), ..rendered })
 }
 
-fn follow<R: Recorder>(
-    job: &Job<'_>,
-    tracer: &PathTracer<'_, R>,
-    progress: &dyn Progress,
-) -> Result<TimedRender, RenderError> {
+fn follow(job: &Job<'_>, tracer: &PathTracer<'_>, progress: &dyn Progress) -> Result<TimedRender, RenderError> {
     let start = Instant::now();
     let mut counters = Counters::default();
     let crop = job.crop();
