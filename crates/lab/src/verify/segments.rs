@@ -167,7 +167,11 @@ impl<'a> Generator<'a> {
             let (i, j) = (draw.pick(3), draw.pick(3));
             d[i] = d[j].abs().copysign(d[i]);
         }
-        let d = nudged(draw, d);
+        let mut d = nudged(draw, d);
+        if draw.chance(0.5) {
+            // Look-ups are in single precision: by its ulps as well.
+            d += DVec3::from_array([(); 3].map(|()| draw.of(&[-2.0, -1.0, 0.0, 1.0, 2.0]) / 16_777_216.0));
+        }
         let reach = self.world.bounds.extent().length();
         let along = match self.world.bvh.intersect(&Segment::new(q, q + d * reach)) {
             Some(hit) => hit.t * draw.of(&[1.0, 1.0, 1.0 - 1e-12, 1.0 + 1e-12, 1.0 - 1e-4, 1.0 + 1e-4, 0.5, 1.5]),

@@ -141,7 +141,7 @@ impl Places {
         let (x, y, z, w) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut self.w[..n]);
         let (texel, code) = (&mut self.texel[..n], &mut self.code[..n]);
         for i in 0..n {
-            let place = cube.place_of::<WHOLE>([x[i], y[i], z[i]]);
+            let place = cube.place_of::<WHOLE, true>([x[i], y[i], z[i]]);
             [x[i], y[i], z[i]] = place.direction.x;
             w[i] = place.direction.w;
             texel[i] = place.texel;

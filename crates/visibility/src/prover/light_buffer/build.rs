@@ -517,7 +517,7 @@ fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins,
     view.records().par_iter_mut().zip(&numbers).for_each(|(record, &number)| {
         // Those that have no cone do not occur.
         if let Some(cone) = Cone::new(&triangles[number as usize], cube.light()) {
-            *record = Record::new(&cone).0;
+            *record = Record::numbers(&cone);
         }
     });
     view.put_texels(0, (0..place::FIRST).map(|i| if i == place::UNKNOWN { Texel::UNKNOWN } else { Texel::EMPTY }));

@@ -95,7 +95,7 @@ impl Cube {
     #[inline(always)]
     pub(super) fn place(&self, from: DVec3) -> Place {
         let d = self.difference(from);
-        if self.whole { self.place_of::<true>(d) } else { self.place_of::<false>(d) }
+        if self.whole { self.place_of::<true, false>(d) } else { self.place_of::<false, false>(d) }
     }
 
     /// The difference of a point and the light.
@@ -105,19 +105,25 @@ impl Cube {
         [(from.x - self.light.x) as f32, (from.y - self.light.y) as f32, (from.z - self.light.z) as f32]
     }
 
-    /// The place of a query at this difference from the light. `WHOLE` says that the windows are whole faces.
+    /// The place of a query at this difference from the light. `WHOLE` says that the windows are whole faces, `MANY` that this is one of many, whose
+    /// components are selected in vectors. One alone takes them from memory, for its selections would become branches, which are taken at random.
     #[inline(always)]
-    pub(super) fn place_of<const WHOLE: bool>(&self, [x, y, z]: [f32; 3]) -> Place {
+    pub(super) fn place_of<const WHOLE: bool, const MANY: bool>(&self, [x, y, z]: [f32; 3]) -> Place {
         // The face is that of the largest component.
         let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
         let second = ay > ax;
         let of_two = if second { ay } else { ax };
         let third = az > of_two;
         let w = if third { az } else { of_two };
-        let (u, v, along) = if second { (z, x, y) } else { (y, z, x) };
-        let (u, v, along) = if third { (x, y, z) } else { (u, v, along) };
-        let axis = if third { 4 } else { u32::from(second) << 1 };
-        let face = axis + (along.to_bits() >> 31);
+        let axis = 2 * u32::from(third) + u32::from(second & !third);
+        let (u, v, along) = if MANY {
+            let (u, v, along) = if second { (z, x, y) } else { (y, z, x) };
+            if third { (x, y, z) } else { (u, v, along) }
+        } else {
+            let (cycle, axis) = ([x, y, z, x, y], axis.min(2) as usize);
+            (cycle[axis + 1], cycle[axis + 2], cycle[axis])
+        };
+        let face = 2 * axis + (along.to_bits() >> 31);
         // False for what is no number.
         let valid = (ax + ay + az <= REACH[1]) & (w >= REACH[0]);
         let inverse = w.recip();
@@ -144,8 +150,9 @@ impl Cube {
             let half = self.side as f32 * 0.5;
             return ([half; 2], [half; 2], FIRST + (face << (2 * self.log_side)));
         }
-        let face = (face as usize).min(5);
-        (self.origin.map(|of| of[face]), self.scale.map(|of| of[face]), self.first[face])
+        // Not closures, which would not be made vectors of.
+        let (face, [of_u, of_v], [per_u, per_v]) = ((face as usize).min(5), &self.origin, &self.scale);
+        ([of_u[face], of_v[face]], [per_u[face], per_v[face]], self.first[face])
     }
 }
 
@@ -281,8 +288,8 @@ mod tests {
                 }
             }
             assert_eq!(cube.place(cube.light()).texel, UNKNOWN);
-            assert_eq!(cube.place_of::<true>([1e-31, 0.0, 0.0]).texel, UNKNOWN);
-            assert!(cube.place_of::<true>([-1e-29, 1e-30, 0.0]).texel >= FIRST);
+            assert_eq!(cube.place_of::<true, false>([1e-31, 0.0, 0.0]).texel, UNKNOWN);
+            assert!(cube.place_of::<true, false>([-1e-29, 1e-30, 0.0]).texel >= FIRST);
         }
     }
 

@@ -25,8 +25,11 @@ pub(super) enum Verdict {
 ///
 /// Numbers: the x of the three edges' normals, their y, their z; then the largest error of a product of the plane and a point, over the point's largest
 /// component; then the plane's three numbers, as their bits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Record(pub(super) [f32; 16]);
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record<'a>(pub(super) &'a Numbers);
+
+/// The numbers of a record.
+pub(super) type Numbers = [f32; 16];
 
 /// Where the plane starts, in bytes.
 const PLANE: usize = 40;
@@ -37,9 +40,9 @@ const EDGE_ERROR: f32 = 32.0 / 16_777_216.0;
 /// The error of the last difference, from one.
 const ONE_ERROR: f64 = 4.0 * f64::EPSILON;
 
-impl Record {
-    /// Of a cone in the axes of the world.
-    pub(super) fn new(cone: &Cone) -> Self {
+impl Record<'_> {
+    /// Those of a cone in the axes of the world.
+    pub(super) fn numbers(cone: &Cone) -> Numbers {
         let edge = |i: usize| {
             // Close to it is everywhere where the normal itself is hardly known.
             if cone.edge_errors[i] < 1.0 / 16_777_216.0 { cone.edges[i].as_vec3() } else { Vec3::ZERO }
@@ -52,18 +55,19 @@ impl Record {
         let plane_error = ((4.5 * cone.plane_error) as f32).next_up();
         let mut all = [a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z, plane_error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         bytemuck::bytes_of_mut(&mut all)[PLANE..].copy_from_slice(bytemuck::bytes_of(&cone.plane.to_array()));
-        Self(all)
+        all
     }
 
     /// Whether the triangle meets the closed segment from the light to the light + `d`, whose direction is also given in single precision.
     #[inline(always)]
     pub(super) fn test(self, d: DVec3, &Direction { x: [x, y, z], w }: &Direction) -> Verdict {
         // All three edges at once; the fourth lane says nothing.
-        let [ex, ey, ez] = [0, 3, 6].map(|i| Vec4::from_slice(&self.0[i..i + 4]));
+        let (ex, ey, ez) =
+            (Vec4::from_slice(&self.0[..4]), Vec4::from_slice(&self.0[3..7]), Vec4::from_slice(&self.0[6..10]));
         let [a, b, c, _] = (ex * x + ey * y + ez * z).to_array();
         let of_two = if b < a { b } else { a };
         let least = if c < of_two { c } else { of_two };
-        let [px, py, pz]: [f64; 3] = bytemuck::pod_read_unaligned(&bytemuck::bytes_of(&self.0)[PLANE..]);
+        let [px, py, pz]: [f64; 3] = bytemuck::pod_read_unaligned(&bytemuck::bytes_of(self.0)[PLANE..]);
         let behind = px * d.x + py * d.y + pz * d.z - 1.0;
         let error = f64::from(self.0[9]) * f64::from(w) + ONE_ERROR;
         let passes = (least < -EDGE_ERROR) | (behind < -error);
@@ -82,7 +86,7 @@ mod tests {
 
     #[test]
     fn it_is_a_cache_line() {
-        assert_eq!(size_of::<Record>(), 64);
+        assert_eq!(size_of::<Numbers>(), 64);
     }
 
     /// Points on, before and behind triangles, on their edges' planes and ulps beside: a verdict is what the exact test says, and few are close
@@ -101,7 +105,7 @@ mod tests {
             }
             let triangle = Triangle { vertices: [o, a, b].map(|p| p.as_vec3()) };
             let Some(cone) = Cone::new(&triangle, light) else { continue };
-            let record = Record::new(&cone);
+            let record = Record::numbers(&cone);
             let [va, vb, vc] = triangle.vertices_f64();
             let (s, t) = match i % 5 {
                 0 => (random.f64(), 0.0),
@@ -122,7 +126,7 @@ mod tests {
             let single = d.as_vec3();
             let largest = single.abs().max_element();
             let direction = Direction { x: (single * largest.recip()).to_array(), w: largest };
-            match record.test(d, &direction) {
+            match Record(&record).test(d, &direction) {
                 Verdict::Blocks => {
                     blocks += 1;
                     assert!(hit, "{triangle:?} {light} {from}");

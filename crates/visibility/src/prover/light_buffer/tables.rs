@@ -5,7 +5,10 @@
 
 use vdf_distfield::Bytes;
 
-use super::{Entry, Texel, record::Record};
+use super::{
+    Entry, Texel,
+    record::{Numbers, Record},
+};
 
 /// A texel, or an entry of a list.
 type Pair = [u32; 2];
@@ -25,14 +28,14 @@ pub(super) struct Tables {
 pub(super) struct View<'a> {
     texels: &'a [Pair],
     entries: &'a [Pair],
-    records: &'a [[f32; 16]],
+    records: &'a [Numbers],
 }
 
 /// The same, to be filled.
 pub(super) struct ViewMut<'a> {
     texels: &'a mut [Pair],
     entries: &'a mut [Pair],
-    records: &'a mut [[f32; 16]],
+    records: &'a mut [Numbers],
 }
 
 impl Tables {
@@ -40,8 +43,8 @@ impl Tables {
     pub(super) fn zeroed(texels: usize, entries: usize, records: usize) -> Self {
         let entries_at = texels * size_of::<Pair>();
         // Each record in a cache line of its own.
-        let records_at = (entries_at + entries * size_of::<Pair>()).next_multiple_of(size_of::<Record>());
-        let end = records_at + records * size_of::<Record>();
+        let records_at = (entries_at + entries * size_of::<Pair>()).next_multiple_of(size_of::<Numbers>());
+        let end = records_at + records * size_of::<Numbers>();
         Self { bytes: Bytes::zeroed(end), entries: entries_at, records: records_at, end }
     }
 
@@ -93,8 +96,8 @@ impl View<'_> {
     }
 
     #[inline(always)]
-    pub(super) fn record(&self, number: u32) -> Record {
-        Record(self.records[number as usize])
+    pub(super) fn record(&self, number: u32) -> Record<'_> {
+        Record(&self.records[number as usize])
     }
 
     #[cfg(test)]
@@ -125,7 +128,7 @@ impl ViewMut<'_> {
         }
     }
 
-    pub(super) const fn records(&mut self) -> &mut [[f32; 16]] {
+    pub(super) const fn records(&mut self) -> &mut [Numbers] {
         self.records
     }
 }

@@ -135,6 +135,10 @@ fn hard_point(random: &mut fastrand::Rng, triangles: &[Triangle], light: DVec3, 
             }
             let axis = random.usize(..3);
             d[axis] = if random.bool() { d[axis].next_up() } else { d[axis].next_down() };
+            if random.bool() {
+                // By ulps of single precision, in which places are found.
+                d[axis] += f64::from(random.i8(-3..=3)) / 16_777_216.0;
+            }
             light + d * (0.01 + 2.0 * random.f64())
         }
         8 => (a + b + c) / 3.0,
