@@ -93,7 +93,7 @@ fn floor(fog_from: f32, place: Place, emitter: &str) -> Scene {
             let lamp = Surface {
                 triangles: square(0.01, 3.0, false),
                 bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
-                radiance: Some(Rgb::splat(1e4)),
+                radiance: Some(Rgb::splat(1e4).into()),
                 ..Surface::default()
             };
             scene.emitters.push(Emitter::Area { surface: scene.surfaces.len() });
@@ -183,7 +183,7 @@ fn a_flush_room_is_a_white_furnace() {
             scene.surfaces.push(Surface {
                 triangles: walls,
                 bsdf: Bsdf::lambertian(half, Rgb::ZERO),
-                radiance: Some(half),
+                radiance: Some(half.into()),
                 ..Surface::default()
             });
             scene.emitters.push(Emitter::Area { surface: 0 });

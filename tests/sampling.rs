@@ -200,7 +200,7 @@ fn lit() -> Scene {
     let area = |triangles, radiance| Surface {
         triangles,
         bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
-        radiance: Some(Rgb::splat(radiance)),
+        radiance: Some(Rgb::splat(radiance).into()),
         ..Surface::default()
     };
     scene.surfaces.push(area(

@@ -149,7 +149,7 @@ pub fn add_block_and_lights(scene: &mut Scene) {
     scene.surfaces.push(black(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
     let light = Triangle::new(vec3(-1.2, 1.9, 1.2), vec3(0.8, 1.9, 1.2), vec3(0.8, 1.9, 2.4));
     let lamp = scene.surfaces.len();
-    scene.surfaces.push(black(vec![light], Some(Rgb::splat(2.0))));
+    scene.surfaces.push(black(vec![light], Some(Rgb::splat(2.0).into())));
     scene.emitters.push(Emitter::Area { surface: lamp });
     scene.emitters.push(Emitter::Point { position: dvec3(2.6, 1.2, 0.6), intensity: Rgb::splat(5.0) });
     scene.emitters.push(Emitter::Constant { radiance: Rgb::splat(0.3) });

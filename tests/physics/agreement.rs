@@ -39,7 +39,7 @@ fn scene(reflectance: f32, albedo: f32, density: f64) -> Scene {
     scene.surfaces.push(surface(cuboid(vec3(-0.9, -0.8, 1.5), vec3(-0.2, 0.1, 2.2)), None));
     scene.surfaces.push(surface(cuboid(vec3(0.3, -0.5, 2.6), vec3(0.9, 0.6, 4.0)), None));
     let lamp = Triangle::new(vec3(-1.2, 1.9, 1.2), vec3(0.8, 1.9, 1.2), vec3(0.8, 1.9, 2.4));
-    scene.surfaces.push(surface(vec![lamp], Some(Rgb::splat(4.0))));
+    scene.surfaces.push(surface(vec![lamp], Some(Rgb::splat(4.0).into())));
     scene.emitters.push(Emitter::Area { surface: 2 });
     scene.emitters.push(Emitter::Point { position: dvec3(2.0, 1.2, 0.6), intensity: Rgb::splat(5.0) });
     scene.emitters.push(Emitter::Constant { radiance: Rgb::splat(0.3) });

@@ -65,7 +65,7 @@ fn body_in_fog() -> Scene {
     scene.surfaces.push(surface(cuboid(vec3(-0.4, -1.4, 2.0), vec3(0.5, 0.2, 2.6)), None));
     scene.surfaces.push(surface(
         vec![Triangle::new(vec3(-1.2, 1.8, 1.2), vec3(-0.2, 1.8, 1.2), vec3(-0.2, 1.8, 2.2))],
-        Some(Rgb::splat(4.0)),
+        Some(Rgb::splat(4.0).into()),
     ));
     scene.emitters.push(Emitter::Point { position: dvec3(0.9, 0.7, 0.1), intensity: Rgb::splat(1.0) });
     scene.emitters.push(Emitter::Area { surface: 1 });

@@ -1,9 +1,9 @@
 //! Balances of energy: what is neither absorbed nor lost comes back.
 
-use glam::{DMat4, dvec3, vec3};
+use glam::{DMat3, DMat4, dvec3, vec3};
 use vdf::{
-    geometry::Triangle,
-    scene::{Bsdf, Emitter, IntegratorSettings, MediumId, Phase, Rgb, Scene, Surface},
+    geometry::{CurvedKind, CurvedShape, Triangle},
+    scene::{Boundary, Bsdf, Emitter, IntegratorSettings, MediumId, Phase, Rgb, Scene, Surface, Texture},
 };
 
 use crate::{
@@ -38,6 +38,45 @@ fn nothing_is_lost_under_a_uniform_sky() {
     }
 }
 
+/// White curved shapes, and a ball of clear glass with white fog inside, in a ball of white fog under a uniform sky: radiance is 1 everywhere. In glass it is the square of the
+/// index times that, which is undone where light leaves. The phase functions are those that the test above has not.
+#[test]
+fn curved_shapes_lose_nothing_under_a_uniform_sky() {
+    let shape = |kind, size: f64, at| {
+        let linear = DMat3::from_rotation_x(0.4) * size;
+        CurvedShape::new(kind, linear, at, false).expect("it can be inverted")
+    };
+    let glass = Bsdf::Dielectric {
+        eta: 1.5,
+        reflectance: Texture::grey(1.0),
+        transmittance: Texture::grey(1.0),
+        roughness: None,
+    };
+    let white = Bsdf::lambertian(Rgb::ONE, Rgb::ONE);
+    for way in TRACED {
+        let mut check = Check::by("white furnace, curved shapes", way);
+        let mut scene = empty_scene(16, 1, 0.35);
+        scene.emitters.push(Emitter::Constant { radiance: Rgb::ONE });
+        let fog = add_medium(&mut scene, 0.6, 1.0, Phase::TwoLobes { weight: 0.4, g: [0.6, -0.3] });
+        let thick = add_medium(&mut scene, 2.0, 1.0, Phase::Rayleigh);
+        let outer = shape(CurvedKind::Sphere, 2.0, dvec3(0.0, 0.0, 3.0));
+        let ball = shape(CurvedKind::Sphere, 0.4, dvec3(-0.3, -0.3, 2.4));
+        for (curved, interior, exterior) in [(outer, fog, None), (ball, thick, Some(fog))] {
+            let interior = Some(interior);
+            scene.boundaries.push(Boundary { curved: Some(curved), interior, exterior, ..Boundary::default() });
+        }
+        for (curved, bsdf) in [
+            (shape(CurvedKind::Sphere, 0.4, dvec3(-0.6, 0.5, 3.0)), &white),
+            (shape(CurvedKind::Disk, 0.5, dvec3(0.5, 0.6, 2.6)), &white),
+            (shape(CurvedKind::Cylinder, 0.4, dvec3(0.6, -0.5, 2.8)), &white),
+            (ball, &glass),
+        ] {
+            scene.surfaces.push(Surface { curved: Some(curved), bsdf: bsdf.clone(), ..Surface::default() });
+        }
+        check.mean("glass, ball, disk, cylinder", &check.render(&scene, 32), 1.0);
+    }
+}
+
 /// A closed room whose walls (or only the one at +Z) emit and reflect that; the rest reflects all. The camera is in it.
 fn room(emitted: f32, reflectance: f32, one_wall_only: bool) -> Scene {
     let mut scene = empty_scene(32, 1, 0.7);
@@ -52,7 +91,7 @@ fn room(emitted: f32, reflectance: f32, one_wall_only: bool) -> Scene {
         radiance,
         ..Surface::default()
     };
-    scene.surfaces.push(surface(emitting, reflectance, Some(Rgb::splat(emitted))));
+    scene.surfaces.push(surface(emitting, reflectance, Some(Rgb::splat(emitted).into())));
     scene.surfaces.push(surface(white, 1.0, None));
     scene.emitters.push(Emitter::Area { surface: 0 });
     scene

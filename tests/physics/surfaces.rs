@@ -146,7 +146,7 @@ fn by_an_area_light() {
                     Triangle::new(corners[0], corners[2], corners[3]),
                 ],
                 bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
-                radiance: Some(Rgb::ONE),
+                radiance: Some(Rgb::ONE.into()),
                 ..Surface::default()
             });
             scene.emitters.push(Emitter::Area { surface: 1 });

@@ -326,7 +326,7 @@ fn case_44_tiny_and_huge_emitters() {
         scene.surfaces.push(Surface {
             triangles: vec![Triangle::new(a, b, c), Triangle::new(a, c, d)],
             bsdf: Bsdf::lambertian(Rgb::ZERO, Rgb::ZERO),
-            radiance: Some(Rgb::splat(0.5 / (half * half).min(1.0))),
+            radiance: Some(Rgb::splat(0.5 / (half * half).min(1.0)).into()),
             ..Surface::default()
         });
         scene.emitters.push(Emitter::Area { surface: 1 });

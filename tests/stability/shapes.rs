@@ -47,7 +47,7 @@ fn grazing_rays_along_walls() {
 #[test]
 fn degenerate_and_duplicated_triangles() {
     let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
-    scene.surfaces[1].radiance = Some(Rgb::splat(0.2));
+    scene.surfaces[1].radiance = Some(Rgb::splat(0.2).into());
     scene.emitters.push(Emitter::Area { surface: 1 });
     let reference = same_for_all_methods("without", &scene, 1.0);
     let points =
@@ -76,7 +76,12 @@ fn degenerate_and_duplicated_triangles() {
     }
     // An emitter of which nothing is left.
     let mut dark = room(&[]);
-    dark.surfaces.push(Surface { triangles: degenerate, bsdf: GREY, radiance: Some(Rgb::ONE), ..Surface::default() });
+    dark.surfaces.push(Surface {
+        triangles: degenerate,
+        bsdf: GREY,
+        radiance: Some(Rgb::ONE.into()),
+        ..Surface::default()
+    });
     dark.emitters.push(Emitter::Area { surface: 2 });
     for pixels in same_for_all_methods("an emitter without area", &dark, 1.0) {
         assert!(pixels.iter().all(|&p| p == Rgb::ZERO));
@@ -99,8 +104,12 @@ fn slivers() {
     let cuts: Vec<f32> = [vec![1.0], thin, vec![2.5, 2.5_f32.next_up(), 4.0, 7.0]].concat();
     let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
     scene.sample_count = 32;
-    let mut emitting =
-        Surface { triangles: strip(&[1.0, 7.0]), bsdf: GREY, radiance: Some(Rgb::splat(0.3)), ..Surface::default() };
+    let mut emitting = Surface {
+        triangles: strip(&[1.0, 7.0]),
+        bsdf: GREY,
+        radiance: Some(Rgb::splat(0.3).into()),
+        ..Surface::default()
+    };
     scene.surfaces.push(emitting.clone());
     scene.emitters.push(Emitter::Area { surface: 2 });
     let whole = same_for_all_methods("one floor", &scene, 1.0);

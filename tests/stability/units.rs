@@ -39,7 +39,7 @@ fn powers_of_two_as_units_change_no_bit() {
     let small = [("width", "16"), ("height", "16"), ("spp", "2")];
     let mut sky = room(&[dvec3(2.0, 6.0, 3.0)]);
     sky.emitters.push(Emitter::Area { surface: 1 });
-    sky.surfaces[1].radiance = Some(Rgb::splat(0.3));
+    sky.surfaces[1].radiance = Some(Rgb::splat(0.3).into());
     for (name, scene, voxel_size) in [("cbox_vol2", builtin("cbox_vol2", &small), 16.0), ("room", sky, 1.0)] {
         for integrator in BOTH {
             let render = |scale: f64, method: &str| {

@@ -1,10 +1,13 @@
 //! A scene prepared for rendering: hierarchy, media, emitters and the surface behind every triangle.
 
-use std::f64::consts::{PI, TAU};
+use std::{
+    f64::consts::{PI, TAU},
+    sync::Arc,
+};
 
 use glam::{DVec3, Vec2, dvec3, vec2};
 use vdf_geometry::{Bounds, Bvh, CurvedKind, CurvedShape, Hit, Segment, Triangle};
-use vdf_scene::{Bsdf, Emitter, Extinction, Medium, MeshAttributes, Rgb, Scene, TexturePoint};
+use vdf_scene::{Bsdf, Emitter, Extinction, Medium, MeshAttributes, Rgb, Scene, Texture, TexturePoint};
 use vdf_visibility::LightShape;
 
 use crate::{
@@ -45,7 +48,12 @@ struct SurfaceData {
     /// Reflectance of the two sides, if it is plain.
     front: Rgb,
     back: Rgb,
+    /// Where it is the same everywhere; black otherwise.
     radiance: Rgb,
+    /// Where it is not.
+    glow: Option<Box<Texture>>,
+    /// What a texture of its radiance is looked up by.
+    attributes: Arc<MeshAttributes>,
     /// Number of the area emitter, if it is one.
     emitter: Option<usize>,
     /// Number of its [`Shading`], if it is not plain.
@@ -61,7 +69,7 @@ struct SurfaceData {
 pub(crate) struct Shading {
     pub(crate) material: Material,
     needs_tangents: bool,
-    attributes: std::sync::Arc<MeshAttributes>,
+    attributes: Arc<MeshAttributes>,
 }
 
 /// A point on an occluder, seen from one side.
@@ -148,8 +156,25 @@ impl World {
             let veil = shading.is_some_and(|m| materials[m as usize].material.may_pass());
             let (front, back) = plain.unwrap_or_default();
             let first_triangle = if veil { veiled } else { triangles.len() as u32 };
-            let (radiance, curved) = (s.radiance.unwrap_or(Rgb::ZERO), s.curved);
-            surfaces.push(SurfaceData { front, back, radiance, emitter: None, shading, first_triangle, veil, curved });
+            let (radiance, glow) = match &s.radiance {
+                Some(Texture::Constant(radiance)) => (*radiance, None),
+                Some(texture) => (Rgb::ZERO, Some(Box::new(texture.clone()))),
+                None => (Rgb::ZERO, None),
+            };
+            let (curved, attributes) = (s.curved, s.attributes.clone());
+            let emitter = None;
+            surfaces.push(SurfaceData {
+                front,
+                back,
+                radiance,
+                glow,
+                attributes,
+                emitter,
+                shading,
+                first_triangle,
+                veil,
+                curved,
+            });
             is_veil.push(veil);
             if veil {
                 veiled += s.triangles.len() as u32;
@@ -306,10 +331,22 @@ fn triangle_point(
         point: a * wa + b * wb + c * wc + normal * lift(triangle),
         normal,
         reflectance: if front { data.front } else { data.back },
-        emitted: if front { data.radiance } else { Rgb::ZERO },
+        emitted: match &data.glow {
+            _ if !front => Rgb::ZERO,
+            None => data.radiance,
+            Some(texture) => glow(texture, &data.attributes, at.number, [wb, wc]),
+        },
         emitter: data.emitter,
         place: data.shading.map(|_| Place { surface: at.surface, triangle: at.number, barycentric: [wb, wc] }),
     }
+}
+
+/// What a triangle emits at a place of it.
+#[cold]
+pub(crate) fn glow(texture: &Texture, attributes: &MeshAttributes, triangle: u32, [wb, wc]: [f64; 2]) -> Rgb {
+    let &[a, b, c] = attributes.uvs.get(triangle as usize).unwrap_or(&[Vec2::ZERO, Vec2::X, Vec2::Y]);
+    let uv = (a.as_dvec2() * (1.0 - wb - wc) + b.as_dvec2() * wb + c.as_dvec2() * wc).as_vec2();
+    texture.at(&TexturePoint { uv, triangle, barycentric: [wb as f32, wc as f32] })
 }
 
 /// The point of a shape that is nearest to a place on it that was rounded.
@@ -331,7 +368,11 @@ fn curved_point(
         point: at.point + normal * curved_lift(shape),
         normal,
         reflectance: if front { data.front } else { data.back },
-        emitted: if front { data.radiance } else { Rgb::ZERO },
+        emitted: match &data.glow {
+            _ if !front => Rgb::ZERO,
+            None => data.radiance,
+            Some(texture) => texture.at(&parametrization(shape, at.local).0.into()),
+        },
         emitter: data.emitter,
         place: data.shading.map(|_| Place { surface, triangle: 0, barycentric: [0.0; 2] }),
     }
@@ -344,7 +385,7 @@ fn nothing(point: DVec3, direction: DVec3) -> SurfacePoint {
 }
 
 /// Texture coordinates as Mitsuba has them, and ∂p/∂u and ∂p/∂v in the world.
-fn parametrization(shape: &CurvedShape, p: DVec3) -> (Vec2, [DVec3; 2]) {
+pub(crate) fn parametrization(shape: &CurvedShape, p: DVec3) -> (Vec2, [DVec3; 2]) {
     let turn = (p.y.atan2(p.x) / TAU).rem_euclid(1.0);
     let radius = p.x.hypot(p.y);
     // Outwards from the axis and around it.

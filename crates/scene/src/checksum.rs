@@ -106,8 +106,20 @@ impl Sum {
             }
             other => self.bsdf(other),
         }
-        self.words(&[u32::from(radiance.is_some())]);
-        self.colour(radiance.unwrap_or_default());
+        match radiance {
+            Some(Texture::Constant(radiance)) => {
+                self.words(&[1]);
+                self.colour(*radiance);
+            }
+            Some(texture) => {
+                self.words(&[2]);
+                self.texture(texture);
+            }
+            None => {
+                self.words(&[0]);
+                self.colour(Rgb::ZERO);
+            }
+        }
     }
 
     fn curved(&mut self, shape: Option<&CurvedShape>) {

@@ -49,7 +49,7 @@ pub struct Surface {
     pub bsdf: Bsdf,
     /// Radiance emitted from the front side (the side of the normal), if the shape is an area emitter. Such a
     /// surface also has an [`Emitter::Area`] in [`Scene::emitters`].
-    pub radiance: Option<Rgb>,
+    pub radiance: Option<Texture>,
 }
 
 /// What the corners of a mesh's triangles carry beside their places, triangle by triangle.

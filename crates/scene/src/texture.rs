@@ -72,6 +72,13 @@ pub enum Texture {
     Attribute(Arc<Attribute>),
 }
 
+impl From<Rgb> for Texture {
+    /// The same everywhere.
+    fn from(colour: Rgb) -> Self {
+        Self::Constant(colour)
+    }
+}
+
 /// What is between the middles of pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TextureFilter {

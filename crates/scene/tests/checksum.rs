@@ -47,7 +47,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.surfaces[0].triangles.swap(0, 1),
         |s| s.surfaces[0].bsdf = Bsdf::lambertian(Vec3::splat(0.125), Vec3::ZERO),
         |s| s.surfaces[0].bsdf = Bsdf::lambertian(Vec3::ZERO, Vec3::splat(0.125)),
-        |s| s.surfaces[0].radiance = Some(Rgb::ZERO),
+        |s| s.surfaces[0].radiance = Some(Rgb::ZERO.into()),
         |s| drop(s.surfaces.pop()),
         |s| s.boundaries[0].interior = None,
         |s| s.boundaries[0].exterior = s.boundaries[0].interior,

@@ -74,8 +74,8 @@ pub(crate) struct EmitterPoint {
 enum Place {
     Point,
     Area(AreaPoint),
-    /// The numbers that the direction is drawn with.
-    Infinite([f64; 2]),
+    /// The numbers that the direction is drawn with, once it is known from where.
+    Numbers([f64; 2]),
 }
 
 impl EmitterPoint {
@@ -115,7 +115,7 @@ impl Lights {
                 }
                 Emitter::Area { surface } => {
                     let s = &scene.surfaces[surface];
-                    Light::Area(AreaLight::new(&s.triangles, s.curved, s.radiance.unwrap_or(Rgb::ZERO)))
+                    Light::Area(AreaLight::new(s))
                 }
                 Emitter::Constant { radiance } => {
                     background += radiance;
@@ -190,8 +190,8 @@ impl Lights {
     pub(crate) fn sample_point(&self, emitter: usize, u: [f64; 2]) -> Option<EmitterPoint> {
         let place = match &self.lights[emitter] {
             Light::Point { .. } | Light::Spot(_) | Light::Projector(_) => Place::Point,
-            Light::Area(light) => Place::Area(light.sample(u)?),
-            Light::Directional { .. } | Light::Constant { .. } | Light::Envmap(_) => Place::Infinite(u),
+            Light::Area(light) if light.ball().is_none() => Place::Area(light.sample(u)?),
+            Light::Area(_) | Light::Directional { .. } | Light::Constant { .. } | Light::Envmap(_) => Place::Numbers(u),
         };
         Some(EmitterPoint { emitter, place })
     }
@@ -203,7 +203,8 @@ impl Lights {
         match (&self.lights[emitter], &point.place) {
             (Light::Point { position, intensity }, _) => point::sample(emitter, *position, *intensity, from, choices),
             (Light::Area(light), Place::Area(place)) => light.seen_from(emitter, from, place, choices),
-            (Light::Constant { radiance }, Place::Infinite(u)) => {
+            (Light::Area(light), Place::Numbers(u)) => light.ball()?.sample(light, emitter, from, *u, choices),
+            (Light::Constant { radiance }, Place::Numbers(u)) => {
                 Some(constant::sample(emitter, from, *u, *radiance, self.pdf_constant(), self.reach))
             }
             (Light::Spot(light), _) => light.sample(emitter, from, choices),
@@ -211,18 +212,22 @@ impl Lights {
             (Light::Directional { direction, irradiance }, _) => {
                 Some(directional::sample(emitter, from, *direction, *irradiance, choices, self.reach))
             }
-            (Light::Envmap(map), Place::Infinite(u)) => map.sample(emitter, from, *u, choices, self.reach),
+            (Light::Envmap(map), Place::Numbers(u)) => map.sample(emitter, from, *u, choices, self.reach),
             (Light::Area(_) | Light::Constant { .. } | Light::Envmap(_), _) => None,
         }
     }
 
-    /// Where a place is and, if it shines to one side only, the unit normal of that side; `None` if it is infinitely far away.
+    /// Where a place is and, if it shines to one side only, the unit normal of that side; `None` if it is infinitely far away. Of a ball, whose points are
+    /// drawn once it is known from where, it is the middle.
     #[inline]
     pub(crate) fn position(&self, point: &EmitterPoint) -> Option<(DVec3, Option<DVec3>)> {
         match &point.place {
             Place::Point => self.point_position(point.emitter).map(|position| (position, None)),
             Place::Area(place) => Some((place.point, Some(place.normal))),
-            Place::Infinite(_) => None,
+            Place::Numbers(_) => match &self.lights[point.emitter] {
+                Light::Area(light) => light.ball().map(|ball| (ball.centre, None)),
+                _ => None,
+            },
         }
     }
 

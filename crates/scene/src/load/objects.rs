@@ -6,7 +6,7 @@ use super::document::Element;
 use super::properties::{Nested, Object};
 use super::{Loader, camera, features, textures, volumes};
 use crate::{Albedo, Emitter, Medium, MediumId, Phase};
-use crate::{Rgb, SceneError, Slide, Texture};
+use crate::{SceneError, Slide, Texture};
 
 /// The medium's index; each is read once, however often it is referred to.
 pub(super) fn medium<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<MediumId, SceneError> {
@@ -177,9 +177,12 @@ fn envmap<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, S
 }
 
 /// The radiance of an area light.
-pub(super) fn area_emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Rgb, SceneError> {
+pub(super) fn area_emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Texture, SceneError> {
     let mut object = Object::new(loader, element, &["area"])?;
-    let radiance = object.emission(loader, "radiance")?;
+    let radiance = match object.texture_element("radiance")? {
+        Some(nested) if textures::varies(nested) => textures::read(loader, nested)?,
+        _ => Texture::Constant(object.emission(loader, "radiance")?),
+    };
     sampling_weight(&mut object)?;
     object.finish()?;
     Ok(radiance)

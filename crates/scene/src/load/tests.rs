@@ -283,7 +283,7 @@ fn emitters_are_read() {
         "<shape type='rectangle'><emitter type='area'><rgb name='radiance' value='1 2 3'/></emitter></shape><emitter type='constant'/>",
     );
     assert_eq!(scene.emitters[0], Emitter::Area { surface: 0 });
-    assert_eq!(scene.surfaces[0].radiance, Some(Vec3::new(1.0, 2.0, 3.0)));
+    assert_eq!(scene.surfaces[0].radiance, Some(Vec3::new(1.0, 2.0, 3.0).into()));
     assert_eq!(scene.surfaces[0].bsdf, Bsdf::lambertian(Vec3::ZERO, Vec3::ZERO));
     assert_eq!(scene.emitters[1], Emitter::Constant { radiance: Vec3::ONE });
     refused("<emitter type='area'/>", "3:1", "no shape");

@@ -26,6 +26,11 @@ pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Text
     read_within(loader, element, 0)
 }
 
+/// Whether the texture is none of the types of a spectrum, which are the same everywhere.
+pub(super) fn varies(element: &Element) -> bool {
+    element.attribute("type").is_none_or(|kind| !features::kinds("spectrum").contains(&kind.value.as_str()))
+}
+
 fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> Result<Texture, SceneError> {
     let mut object = Object::new(loader, element, features::kinds("texture"))?;
     if depth == MAX_DEPTH {
@@ -49,7 +54,7 @@ fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> R
             let missing = || object.error("no value", "add <float name=\"value\" …>, or a <vector>");
             Texture::Constant(value.ok_or_else(missing)?)
         }
-        "uniform" | "srgb" | "d65" | "regular" | "irregular" | "blackbody" => {
+        _ if !varies(element) => {
             let colour = plugins::spectrum(loader, element, Weighed::ByDaylight)?;
             return Ok(Texture::Constant(colour.as_vec3()));
         }

@@ -16,8 +16,8 @@ use placement::Placement;
 use super::document::Element;
 use super::properties::Object;
 use super::{Loader, features, materials, names, objects};
+use crate::SceneError;
 use crate::{Boundary, Bsdf, Emitter, MediumId, MeshAttributes, Surface, Texture};
-use crate::{Rgb, SceneError};
 
 /// What a shape is made of.
 #[derive(Debug, Default)]
@@ -93,19 +93,15 @@ fn read_at<'a>(loader: &mut Loader<'a>, element: &'a Element, outer: DMat4) -> R
         );
     }
     let (interior, exterior) = media(loader, &mut object)?;
-    let radiance = area_emitter(loader, &mut object)?;
     let mut placed = placed;
     let mut named = std::mem::take(&mut placed.named);
     if flip {
         named.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
     loader.attributes = Some(named);
-    let bsdf = match object.at_most_one("bsdf")? {
-        Some(nested) => materials::bsdf(loader, nested.object),
-        None => Ok(materials::default_bsdf(radiance.is_some())),
-    };
+    let looks = looks(loader, &mut object);
     loader.attributes = None;
-    let bsdf = bsdf?;
+    let (bsdf, radiance) = looks?;
     // As Mitsuba 3.9.1 was seen to do: the winding of the moved vertices decides on which side a medium is, and how a
     // mesh shades; but cube and rectangle shade with their own normals, which a mirroring does not turn round.
     let own_normals = bsdf != Bsdf::Null && matches!(object.kind(), "cube" | "rectangle");
@@ -118,6 +114,16 @@ fn read_at<'a>(loader: &mut Loader<'a>, element: &'a Element, outer: DMat4) -> R
     object.finish()?;
     let geometry = Geometry { triangles: placed.triangles, attributes: placed.attributes, curved };
     attach(loader, element, geometry, bsdf, radiance, [interior, exterior])
+}
+
+/// How the shape scatters, and what it emits.
+fn looks<'a>(loader: &mut Loader<'a>, object: &mut Object<'a>) -> Result<(Bsdf, Option<Texture>), SceneError> {
+    let radiance = area_emitter(loader, object)?;
+    let bsdf = match object.at_most_one("bsdf")? {
+        Some(nested) => materials::bsdf(loader, nested.object)?,
+        None => materials::default_bsdf(radiance.is_some()),
+    };
+    Ok((bsdf, radiance))
 }
 
 /// The triangles of a shape that is not curved.
@@ -166,7 +172,7 @@ fn attach<'a>(
     element: &'a Element,
     geometry: Geometry,
     bsdf: Bsdf,
-    radiance: Option<Rgb>,
+    radiance: Option<Texture>,
     [interior, exterior]: [Option<MediumId>; 2],
 ) -> Result<(), SceneError> {
     let at = &element.at;
@@ -212,7 +218,8 @@ fn attach<'a>(
         loader.emitters.push(Emitter::Area { surface: loader.surfaces.len() });
     }
     let Geometry { triangles, mut attributes, curved } = geometry;
-    if bsdf.textures().iter().all(|t| matches!(t, Texture::Constant(_))) && !bsdf.has_directions() {
+    let mut textures = bsdf.textures().into_iter().chain(&radiance);
+    if textures.all(|t| matches!(t, Texture::Constant(_))) && !bsdf.has_directions() {
         attributes.uvs = Vec::new();
     }
     loader.surfaces.push(Surface { triangles, curved, attributes: Arc::new(attributes), bsdf, radiance });
@@ -246,7 +253,7 @@ fn media<'a>(
     Ok((interior, exterior))
 }
 
-fn area_emitter<'a>(loader: &mut Loader<'a>, object: &mut Object<'a>) -> Result<Option<Rgb>, SceneError> {
+fn area_emitter<'a>(loader: &mut Loader<'a>, object: &mut Object<'a>) -> Result<Option<Texture>, SceneError> {
     let Some(nested) = object.at_most_one("emitter")? else { return Ok(None) };
     let radiance = objects::area_emitter(loader, nested.object)?;
     if !loader.area_emitters.insert(nested.object.serial) {
