@@ -8,7 +8,7 @@ use std::{collections::HashMap, path::Path};
 use anyhow::{Context as _, anyhow};
 use rayon::prelude::*;
 use vdf::{
-    lab::{SceneVoxels, record_queries},
+    lab::{SceneVoxels, queries::record_queries},
     render::{Integrator, PrepareOptions, PreparedScene, Quiet, RenderOptions},
     scene::{Emitter, LoadOptions, Scene, SceneSource},
     scenes::builtin,
