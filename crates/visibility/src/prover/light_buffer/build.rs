@@ -91,11 +91,15 @@ impl Extent {
 }
 
 impl Extent {
-    /// The windows of all faces, with so many texels along each side. Where geometry fills half of all directions or more they are whole faces, for the
-    /// sake of quick look-ups.
-    fn windows(&self, side: u32) -> [Window; 6] {
+    /// Whether geometry fills half of all directions or more.
+    fn is_around(&self) -> bool {
         let area = |[u0, u1, v0, v1]: &[f64; 4]| (u1 - u0) * (v1 - v0);
-        let whole = self.faces.iter().flatten().map(area).sum::<f64>() > 12.0;
+        self.faces.iter().flatten().map(area).sum::<f64>() > 12.0
+    }
+
+    /// The windows of all faces, with so many texels along each side. Where geometry is all around they are whole faces, for the sake of quick look-ups.
+    fn windows(&self, side: u32) -> [Window; 6] {
+        let whole = self.is_around();
         let mut first = place::FIRST;
         self.faces.map(|bounds| {
             let window = match bounds {
@@ -131,7 +135,8 @@ impl LightBuffer {
         if !(light.is_finite() && triangles.par_iter().all(Triangle::is_finite)) {
             return Err(Refusal::NotFinite);
         }
-        let side = side.next_power_of_two().max(TILE);
+        // What is larger than this is refused.
+        let side = side.min(1 << 20).next_power_of_two().max(TILE);
         let extent = triangles
             .par_iter()
             .with_min_len(1024)
@@ -141,12 +146,13 @@ impl LightBuffer {
             return Err(Refusal::OnOccluder);
         }
         // Nothing may cost more than its texels: faces are known now.
-        let texels_per_face = u64::from(side) * u64::from(side);
-        let windows = extent.windows(side);
-        let faces = windows.iter().filter(|w| w.side() > 0).count() as u64;
-        if faces * texels_per_face * size_of::<Texel>() as u64 > max_bytes || triangles.len() > Tag::MOST {
+        let faces = if extent.is_around() { 6 } else { extent.faces.iter().flatten().count() as u64 };
+        let texels = faces * u64::from(side) * u64::from(side);
+        let bytes = texels * size_of::<Texel>() as u64;
+        if bytes > max_bytes || texels > Tag::MOST as u64 || triangles.len() > Tag::MOST {
             return Err(Refusal::Memory);
         }
+        let windows = extent.windows(side);
         let diagonal = vdf_geometry::Bounds::of_triangles(triangles).extent().length();
         if faces > 0 && extent.nearest > FARTHEST * diagonal {
             return Err(Refusal::FarAway);
@@ -156,7 +162,7 @@ impl LightBuffer {
         }
         let depths = DepthCode::new(extent.nearest.min(extent.farthest), extent.farthest);
         let bins = Bins::new(triangles, light, &windows);
-        let spent = AtomicU64::new(faces * texels_per_face * size_of::<Texel>() as u64);
+        let spent = AtomicU64::new(bytes);
         let budget = Budget { spent: &spent, max_bytes };
         let tiles: Vec<Tile> = (0..bins.starts.len() - 1)
             .into_par_iter()

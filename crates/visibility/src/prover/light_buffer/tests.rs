@@ -202,6 +202,9 @@ fn a_light_on_an_occluder_or_far_away_has_no_buffer() {
     assert_eq!(build(dvec3(1.0_f64.next_down(), 0.25, 0.3)), None);
     assert_eq!(build(dvec3(1e5, 0.0, 0.0)), Some(Refusal::FarAway));
     assert_eq!(LightBuffer::build(&room, DVec3::ZERO, 64, 1000).err(), Some(Refusal::Memory));
+    for side in [1 << 14, 1 << 16, u32::MAX] {
+        assert_eq!(LightBuffer::build(&room, DVec3::ZERO, side, u64::MAX).err(), Some(Refusal::Memory), "{side}");
+    }
     assert_eq!(build(dvec3(0.0, f64::NAN, 0.0)), Some(Refusal::NotFinite));
     for size in [1e-30, 1e30] {
         let room = walls(Vec3::splat(-size), Vec3::splat(size), 2);
