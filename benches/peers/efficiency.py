@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""CPU time times variance of Mitsuba 3 and vdf on several scene files, in one run: how much longer one takes for the same noise.
+
+    python efficiency.py --vdf ../../target/release/vdf scene.xml ...
+
+For each scene both render --seeds pictures of --spp samples, in turns; scene files take the parameters width, height and spp. Time is the CPU time of rendering: for Mitsuba that of
+its process around mi.render, after a first picture that compiles; for vdf user and system time of a process less that of one with a single sample, so that neither
+loads. What is compared is what a user gets: vdf with its defaults, one variant of Mitsuba. The noise is the mean over pixels and channels of the variance of the pictures over
+(mean² + 0.01 mean(mean)²), which needs no reference as neither is biased; the means are printed, too. The rows are medians of the times and the noise of all seeds. With few seeds the
+noise of a scene with fireflies (point lights in fog) is itself noisy: --trim leaves out that share of the pixels that are noisiest.
+"""
+
+import argparse
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("scenes", nargs="+", metavar="SCENE.xml")
+parser.add_argument("--vdf", required=True)
+parser.add_argument("--variant", default="llvm_ad_rgb")
+parser.add_argument("--size", type=int, default=64, help="width and height of the film")
+parser.add_argument("--spp", type=int, default=64)
+parser.add_argument("--seeds", type=int, default=5)
+parser.add_argument("--threads", type=int, default=2)
+parser.add_argument("--trim", type=float, default=0.01)
+args = parser.parse_args()
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import OpenEXR
+
+mi.set_variant(args.variant)
+mi.set_log_level(mi.LogLevel.Error)
+dr.set_thread_count(args.threads)
+
+
+def ours(scene, seed, spp, out):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [args.vdf, "render", scene, "--spp", str(spp), "--seed", str(seed), "-j", str(args.threads), "-q", "-o", out]
+    for name in ("width", "height"):
+        command += ["-D", f"{name}={args.size}"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}\n{done.stderr}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with OpenEXR.File(out) as f:
+        channels = f.channels()
+        rgb = channels["RGB"].pixels if "RGB" in channels else np.stack([channels[c].pixels for c in "RGB"], -1)
+    return np.asarray(rgb, dtype=np.float64), after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def theirs(scene, seed, spp):
+    start = time.process_time()
+    image = np.array(mi.render(scene, seed=seed, spp=spp), dtype=np.float64)[..., :3]
+    return image, time.process_time() - start
+
+
+def noise(images):
+    images = np.stack(images)
+    mean = images.mean(0)
+    relative = images.var(0, ddof=1) / (mean**2 + 0.01 * mean.mean() ** 2)
+    kept = np.sort(relative.mean(-1).ravel())
+    return kept[: max(1, round(len(kept) * (1 - args.trim)))].mean()
+
+
+print(f"{args.size} x {args.size}, {args.spp} samples, {args.seeds} seeds, {args.variant}; vdf {args.vdf}\n")
+print("| scene | CPU s, Mitsuba | vdf | noise, Mitsuba | vdf | mean, vdf/Mitsuba | CPU s × noise, Mitsuba/vdf |")
+print("| --- | --- | --- | --- | --- | --- | --- |")
+for path in args.scenes:
+    scene = mi.load_file(path, width=args.size, height=args.size)
+    theirs(scene, 0, args.spp)
+    with tempfile.TemporaryDirectory() as folder:
+        out = os.path.join(folder, "a.exr")
+        pictures, seconds, idle = {"m": [], "v": []}, {"m": [], "v": []}, []
+        for seed in range(1, args.seeds + 1):
+            for who in ("mv", "vm")[seed % 2]:
+                image, t = theirs(scene, seed, args.spp) if who == "m" else ours(path, seed, args.spp, out)
+                pictures[who].append(image)
+                seconds[who].append(t)
+            idle.append(ours(path, seed, 1, out)[1])
+    m = statistics.median(seconds["m"])
+    # The process with one sample has rendered that.
+    v = (statistics.median(seconds["v"]) - statistics.median(idle)) * args.spp / (args.spp - 1)
+    ratio = np.mean(pictures["v"]) / np.mean(pictures["m"])
+    nm, nv = noise(pictures["m"]), noise(pictures["v"])
+    name = os.path.splitext(os.path.basename(path))[0]
+    print(f"| `{name}` | {m:.2f} | {v:.2f} | {nm:.3g} | {nv:.3g} | {ratio:.3f} | {m * nm / (v * nv):.1f} |", flush=True)
