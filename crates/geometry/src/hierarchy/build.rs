@@ -24,6 +24,7 @@ use super::{
     reinsert::{Branch, reinsert},
     slices::{ALONE, Division, Hull, Item, count_uneven, divide, divide_large},
     space::TreeSpace,
+    table::Table,
 };
 use crate::Triangle;
 
@@ -390,8 +391,8 @@ impl Tree {
         }
         // There are fewer than 2²⁹.
         #[allow(clippy::cast_possible_truncation, reason = "there are fewer than 2^29")]
-        let item = |(i, triangle): (usize, &Triangle)| Item::new(space.padded_box(triangle), i as u32);
-        let mut items: Vec<Item> = triangles.par_iter().enumerate().map(item).collect();
+        let item = |i: usize| Item::new(space.padded_box(&triangles[i]), i as u32);
+        let mut items = Table::new(triangles.len(), item);
         let hull = Hull::of(&items);
         let bunch = items.len() / BUNCHES;
         let division = divide_large(&mut items, 0, bunch.max(1));
@@ -401,10 +402,10 @@ impl Tree {
         drop(items);
         let mut pieces = Pieces::default();
         let root = Some(pieces.add(limb));
-        let nodes = (0..pieces.nodes).into_par_iter().map(|i| pieces.node(i)).collect();
+        let nodes = Table::new(pieces.nodes, |i| pieces.node(i));
         let Pieces { leaves, pieces, .. } = pieces;
         drop(pieces);
-        let leaves = leaves.par_iter().map(|numbers| Leaf::new(triangles, used(numbers))).collect();
+        let leaves = Table::new(leaves.len(), |i| Leaf::new(triangles, used(&leaves[i])));
         Self { root, nodes, leaves }
     }
 }

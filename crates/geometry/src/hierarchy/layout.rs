@@ -10,9 +10,10 @@
 //!
 //! *Limits:* 2²⁹ triangles; over more, and up to 2³² − 1, there are no nodes, and all triangles are tested.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 
-use super::space::TreeBox;
+use super::{space::TreeBox, table::Table};
 use crate::Triangle;
 
 /// Triangles of a leaf: as many as a register holds numbers in single precision.
@@ -28,19 +29,22 @@ pub(super) const CHILDREN: usize = WIDTH * REGISTERS;
 pub(super) const TOO_MANY: usize = 1 << 29;
 
 /// Eight boxes, side by side.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
 pub(super) struct Node {
     /// For each axis the lower planes of the boxes and the upper ones, in tree coordinates. Where there is no child the
     /// lower is +∞ and the upper −∞.
     pub(super) planes: [[[Vec4; REGISTERS]; 2]; 3],
     pub(super) children: [Child; CHILDREN],
+    /// The rest of the cache line.
+    rest: [u32; 8],
 }
 
 impl Node {
     const EMPTY: Self = Self {
         planes: [[[Vec4::INFINITY; REGISTERS], [Vec4::NEG_INFINITY; REGISTERS]]; 3],
         children: [Child(0); CHILDREN],
+        rest: [0; 8],
     };
 
     /// A node with these boxes, at most eight; its children are not known yet.
@@ -57,7 +61,8 @@ impl Node {
 }
 
 /// A node, or a leaf and how many triangles it has.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(transparent)]
 pub(super) struct Child(u32);
 
 impl Child {
@@ -95,8 +100,8 @@ fn low_bits(index: usize) -> u32 {
 }
 
 /// The triangles of a leaf, side by side, in world coordinates.
-#[derive(Clone, Copy)]
-#[repr(align(32))]
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(32))]
 pub(super) struct Leaf {
     /// By axis, vertex and triangle.
     pub(super) vertices: [[[f32; WIDTH]; 3]; 3],
@@ -134,16 +139,20 @@ impl Leaf {
 pub(super) struct Tree {
     /// None if there are no nodes; then all leaves are visited.
     pub(super) root: Option<Child>,
-    pub(super) nodes: Vec<Node>,
-    pub(super) leaves: Vec<Leaf>,
+    pub(super) nodes: Table<Node>,
+    pub(super) leaves: Table<Leaf>,
 }
 
 impl Tree {
     /// Leaves only.
     pub(super) fn without_nodes(triangles: &[Triangle]) -> Self {
-        let numbers: Vec<u32> = (0..NONE).take(triangles.len()).collect();
-        let leaves = numbers.chunks(WIDTH).map(|numbers| Leaf::new(triangles, numbers)).collect();
-        Self { root: None, nodes: Vec::new(), leaves }
+        let number = |i: usize| u32::try_from(i).unwrap_or(NONE);
+        let leaf = |i: usize| {
+            let numbers = [0, 1, 2, 3].map(|k| number(WIDTH * i + k));
+            Leaf::new(triangles, &numbers[..WIDTH.min(triangles.len() - WIDTH * i)])
+        };
+        let leaves = Table::new(triangles.len().div_ceil(WIDTH), leaf);
+        Self { root: None, nodes: Table::Small(Vec::new()), leaves }
     }
 
     /// Bytes of nodes and leaves.

@@ -32,6 +32,7 @@ mod leaf;
 mod reinsert;
 mod slices;
 mod space;
+mod table;
 mod traverse;
 mod wedge;
 

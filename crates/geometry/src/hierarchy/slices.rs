@@ -5,6 +5,7 @@
 //! *Cost:* each triangle is looked at a fixed number of times. A set that more than [`UNEVEN`] uneven divisions led to is divided in the
 //! middle, and so are equal centres.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
@@ -21,7 +22,8 @@ pub(super) const ALONE: usize = 4096;
 const TOGETHER: usize = 1 << 16;
 
 /// A triangle's padded box and its number. The number is in `max.w`, see [`Item::new`].
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Item {
     pub(super) min: Vec4,
     pub(super) max: Vec4,
@@ -134,6 +136,30 @@ impl<const N: usize> Slicing<N> {
     }
 }
 
+/// Which of `N` slices along one axis a centre is in: the same as [`Slicing::slices`] says.
+struct Along<const N: usize> {
+    axis: usize,
+    lower: f32,
+    scale: f32,
+}
+
+impl<const N: usize> Slicing<N> {
+    fn along(&self, axis: usize) -> Along<N> {
+        Along { axis, lower: self.lower[axis], scale: self.scale[axis] }
+    }
+}
+
+impl<const N: usize> Along<N> {
+    #[inline(always)]
+    fn slice(&self, item: &Item) -> usize {
+        // An axis that is not known before makes a vector go through memory; here it is only an address.
+        let [min, max] = bytemuck::cast_ref::<Item, [[f32; 4]; 2]>(item);
+        let centre = min[self.axis & 3] + max[self.axis & 3];
+        let v = ((centre - self.lower) * self.scale - 0.5) + 12_582_912.0;
+        v.to_bits() as usize & (N - 1)
+    }
+}
+
 impl<const N: usize> Slices<N> {
     pub(super) const EMPTY: Self = Self { hulls: [[Hull::EMPTY; N]; 3], counts: [[0; N]; 3] };
 
@@ -234,17 +260,21 @@ pub(super) fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
 pub(super) fn divide_cheapest<const N: usize>(items: &mut [Item], centres: Hull) -> Option<(usize, [Hull; 2])> {
     let slicing = Slicing::<N>::new(centres);
     let (axis, last, hulls) = Slices::of(items, &slicing).cheapest()?;
-    Some((partition(items, |item| slicing.slices(item.centre())[axis] <= last), hulls))
+    let along = slicing.along(axis);
+    Some((partition(items, |item| along.slice(item) <= last), hulls))
 }
 
 /// Moves the items that belong to the lower side to the front and counts them. Without a branch, which would be guessed
 /// wrongly as often as not.
+#[inline(always)]
 pub(super) fn partition(items: &mut [Item], is_lower: impl Fn(&Item) -> bool) -> usize {
     let mut lower = 0;
     for i in 0..items.len() {
-        let item = items[i];
-        items.swap(i, lower);
-        lower += usize::from(is_lower(&item));
+        let goes = usize::from(is_lower(&items[i]));
+        let (item, other) = (items[i], items[lower]);
+        items[i] = other;
+        items[lower] = item;
+        lower += goes;
     }
     lower
 }

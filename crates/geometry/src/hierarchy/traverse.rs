@@ -12,7 +12,7 @@ use glam::{DVec3, Vec3A, Vec4};
 use smallvec::SmallVec;
 
 use super::{
-    layout::{CHILDREN, Child, Node, Tree, WIDTH},
+    layout::{CHILDREN, Child, Leaf, Node, Tree, WIDTH},
     leaf::Line,
     space::{TreeDistance, TreeSpace},
 };
@@ -100,13 +100,14 @@ impl Tree {
             }
             return;
         };
+        let (nodes, leaves): (&[Node], &[Leaf]) = (&self.nodes, &self.leaves);
         let mut ray = TreeRay::new(start, test, space);
         // Seven of a node's children wait at most, and hardly ever more than two: only trees deeper than nine levels
         // can make this allocate.
         let mut waiting: SmallVec<[(Child, TreeDistance); 64]> = SmallVec::new();
         loop {
             if next.triangles() == 0 {
-                let node = &self.nodes[next.index()];
+                let node = &nodes[next.index()];
                 let (near, mut hits) = node.intersect(&ray);
                 if hits != 0 {
                     let mut take = || {
@@ -129,7 +130,7 @@ impl Tree {
                     continue;
                 }
             } else {
-                let leaf = &self.leaves[next.index()];
+                let leaf = &leaves[next.index()];
                 let mut candidates = leaf.candidates(next.triangles(), &ray.line);
                 while candidates != 0 {
                     let i = candidates.trailing_zeros() as usize & (WIDTH - 1);

@@ -179,18 +179,19 @@ impl Tree {
             let _ = self.all().try_for_each(|(triangle, _)| visit(&triangle));
             return;
         };
+        let (nodes, leaves): (&[Node], &[Leaf]) = (&self.nodes, &self.leaves);
         let wedge = Wedge::new(apex, segment, space);
         let mut waiting: SmallVec<[Child; 64]> = SmallVec::new();
         loop {
             if next.triangles() == 0 {
-                let node = &self.nodes[next.index()];
+                let node = &nodes[next.index()];
                 let mut hits = wedge.meets(node);
                 while hits != 0 {
                     waiting.push(node.children[hits.trailing_zeros() as usize & 7]);
                     hits &= hits - 1;
                 }
             } else {
-                let leaf = &self.leaves[next.index()];
+                let leaf = &leaves[next.index()];
                 let mut candidates = wedge.candidates(leaf, next.triangles());
                 while candidates != 0 {
                     let i = candidates.trailing_zeros() as usize & (WIDTH - 1);
