@@ -258,7 +258,6 @@ fn divide_few(items: &mut [Item], hull: Hull) -> Option<(usize, [Hull; 2])> {
 }
 
 /// A part of the tree, numbered by itself.
-#[derive(Default)]
 struct Part {
     nodes: Vec<Node>,
     /// The triangles of each leaf.
@@ -266,6 +265,11 @@ struct Part {
 }
 
 impl Part {
+    /// With room for what so many triangles become, as a rule.
+    fn of(triangles: usize) -> Self {
+        Self { nodes: Vec::with_capacity(triangles / 8), leaves: Vec::with_capacity(triangles / 2) }
+    }
+
     /// Adds all that is below a set. Depth first, so that what is near in space is near in memory, and without
     /// recursion.
     fn add(&mut self, set: Set<'_, '_>, top: &Top) -> Child {
@@ -309,7 +313,7 @@ enum Limb {
 
 /// All that is below a set, in parallel.
 fn grow(set: Set<'_, '_>, top: &Top) -> Limb {
-    let mut part = Part::default();
+    let mut part = Part::of(set.len(top).min(ALONE));
     if set.len(top) <= ALONE {
         let root = part.add(set, top);
         return Limb::Part(part, root);

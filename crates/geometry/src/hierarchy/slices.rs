@@ -236,7 +236,7 @@ pub(super) fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
         // With few triangles the slices, not the triangles, take the time.
         let cheapest = match items.len() {
             ..=8 => divide_cheapest::<4>(items, centres),
-            9..=32 => divide_cheapest::<8>(items, centres),
+            9..=64 => divide_cheapest::<8>(items, centres),
             _ => divide_cheapest::<16>(items, centres),
         };
         if let Some(division) = cheapest {
