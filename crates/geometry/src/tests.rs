@@ -83,7 +83,8 @@ fn first_by_a_loop(triangles: &[Triangle], s: &Segment) -> Option<(f64, u32)> {
     let Bounds { min, max } = Bounds::of_triangles(triangles);
     let test = SegmentTest::new(*s, min, max);
     let hits = triangles.iter().zip(0..).filter_map(|(t, number)| test.intersect(t).map(|hit| (hit.t, number)));
-    hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+    // −0 is no less than 0.
+    hits.min_by(|a, b| (a.0 + 0.0).total_cmp(&(b.0 + 0.0)).then(a.1.cmp(&b.1)))
 }
 
 proptest! {

@@ -129,7 +129,9 @@ impl Bvh {
             // Last things first: nothing can be culled.
             Approach::Backwards(ray) => (ray, f64::NEG_INFINITY),
             Approach::Far => {
-                return self.all_hits(&test).min_by(|a, b| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle)));
+                // As numbers: −0 is no less than 0, here as in the tree.
+                let t = |hit: &Hit| hit.t + 0.0;
+                return self.all_hits(&test).min_by(|a, b| t(a).total_cmp(&t(b)).then(a.triangle.cmp(&b.triangle)));
             }
         };
         self.tree.traverse(ray, &test, self.space, |hit, triangle| {
