@@ -268,9 +268,15 @@ fn largest_excess(scene: &Scene) -> f64 {
     -(-SHADOW_EPSILON * depth).exp_m1()
 }
 
-/// By how much `ours` is more than `theirs`, or less than that without the excess that it may have.
-fn beyond(ours: f64, theirs: f64, excess: f64) -> f64 {
-    (ours - theirs).max(0.0) + (ours - theirs * (1.0 - excess)).min(0.0)
+/// The share by which Mitsuba's light may be too little. In `curved` its lamp, seen through a part of a sphere of fog at depth 1, is 0.46 ± 0.08 % fainter than by Beer–Lambert
+/// and quadrature over the pixels, and ours is not (24 × 8192 samples a pixel; without fog both agree). Why is not known.
+fn largest_lack(case: &Case) -> f64 {
+    if case.scene == "curved" { 5e-3 } else { 0.0 }
+}
+
+/// By how much `ours` is more than `theirs` with all that it may lack, or less than that without the excess that it may have.
+fn beyond(ours: f64, theirs: f64, [lack, excess]: [f64; 2]) -> f64 {
+    (ours - theirs * (1.0 + lack)).max(0.0) + (ours - theirs * (1.0 - excess)).min(0.0)
 }
 
 /// How two renderers' blocks compare.
@@ -296,7 +302,7 @@ fn largest_error(compared: Compared) -> f64 {
     if compared == OnlyImage { 0.05 } else { 0.01 }
 }
 
-fn compare(ours: &Blocks, theirs: &Blocks, excess: f64, compared: Compared) -> Comparison {
+fn compare(ours: &Blocks, theirs: &Blocks, off: [f64; 2], compared: Compared) -> Comparison {
     let known = |i: &usize| theirs.variance[*i].sqrt() <= largest_error(compared) * theirs.mean[*i];
     // A block that sees only the background has no noise.
     let noisy = |i: &usize| known(i) && theirs.variance[*i] > 0.0 && ours.variance[*i] > 0.0;
@@ -305,7 +311,7 @@ fn compare(ours: &Blocks, theirs: &Blocks, excess: f64, compared: Compared) -> C
     let mut exact = 0;
     let mut z = Vec::new();
     for i in all.clone().filter(known) {
-        let difference = beyond(ours.mean[i], theirs.mean[i], excess);
+        let difference = beyond(ours.mean[i], theirs.mean[i], off);
         if noisy(&i) {
             z.push(difference / (ours.variance[i] + theirs.variance[i]).sqrt());
         } else {
@@ -322,7 +328,7 @@ fn compare(ours: &Blocks, theirs: &Blocks, excess: f64, compared: Compared) -> C
         let n = blocks.len() as f64;
         let ratio = blocks.iter().map(|&i| ours.mean[i] / theirs.mean[i]).sum::<f64>() / n;
         let variance = blocks.iter().map(|&i| (ours.variance[i] + theirs.variance[i]) / theirs.mean[i].powi(2));
-        (ratio, beyond(ratio, 1.0, excess) / (variance.sum::<f64>() / (n * n)).sqrt())
+        (ratio, beyond(ratio, 1.0, off) / (variance.sum::<f64>() / (n * n)).sqrt())
     };
     let channels = [0, 1, 2].map(channel);
 
@@ -411,8 +417,8 @@ const HEAD: &str = "| scene | max_depth | way | blocks × channels | beyond 3σ 
 /// Compares a render with a reference, prints the row of the table, and returns what is wrong.
 fn check(case: &Case, reference: &str, way: Way, record: &serde_json::Value) -> Vec<String> {
     let scene = load(case.scene, case.depth);
-    let comparison =
-        compare(&ours(case, &scene, way), &theirs(reference, record), largest_excess(&scene), case.compared);
+    let off = [largest_lack(case), largest_excess(&scene)];
+    let comparison = compare(&ours(case, &scene, way), &theirs(reference, record), off, case.compared);
     println!("{}", comparison.row(case, way));
     comparison.complaints(case, way)
 }
