@@ -1,4 +1,4 @@
-//! What proofs from voxels can reach: of the spatial queries of a render towards point lights the share that is unoccluded, that `amr-xsn` and `amr-hop` prove, and that a free
+//! What proofs from voxels can reach: of the spatial queries of a render in the grid towards point lights the share that is unoccluded, that `amr-xsn` and `amr-hop` prove, and that a free
 //! shaft between two voxels would prove, which nothing that knows only voxels can exceed.
 //!
 //! Usage: `shafts SCENE VOXEL [QUERIES]`; a scene is a built-in name or a file. Cost: each voxel with a query is compared with all occupied ones between it and the light.
@@ -33,21 +33,24 @@ fn main() -> anyhow::Result<()> {
     let render = RenderOptions { integrator: Integrator::raymarch(7), ..RenderOptions::thesis() };
     let stream = record_queries(&cuboids, &render, most, &Quiet)?;
     let emitters = &cuboids.scene().emitters;
-    let asked: Vec<_> = (stream.queries.iter().zip(&stream.unoccluded))
-        .filter(|(q, _)| q.kind == QueryKind::Spatial && matches!(emitters[q.emitter], Emitter::Point { .. }))
-        .collect();
-    // Queries by the voxels of their ends; those that leave the grid have none.
+    let towards_points = (stream.queries.iter().zip(&stream.unoccluded))
+        .filter(|(q, _)| q.kind == QueryKind::Spatial && matches!(emitters[q.emitter], Emitter::Point { .. }));
+    // Those that leave the grid are proved from where they enter it, which is another question.
     let ends = |from, to| Some([grid.voxel_containing(from)?, grid.voxel_containing(to)?]);
+    let mut asked = Vec::new();
     let mut pairs: HashMap<[Voxel; 2], usize> = HashMap::new();
-    for pair in asked.iter().filter_map(|(q, _)| ends(q.from, q.to)) {
-        *pairs.entry(pair).or_default() += 1;
+    for (query, unoccluded) in towards_points {
+        if let Some(pair) = ends(query.from, query.to) {
+            asked.push((query, unoccluded));
+            *pairs.entry(pair).or_default() += 1;
+        }
     }
     let free = pairs.par_iter().filter(|([u, light], _)| is_free(*u, *light, &occupied)).map(|(_, n)| n).sum();
     let proved =
         |by: &PreparedScene| asked.iter().filter(|(q, _)| by.provers().answer(q) == Answer::Unoccluded).count();
     let unoccluded = asked.iter().filter(|(_, unoccluded)| **unoccluded).count();
     let share = |n: usize| 100.0 * n as f64 / asked.len() as f64;
-    println!("{} spatial queries towards point lights", asked.len());
+    println!("{} spatial queries in the grid towards point lights", asked.len());
     println!("| unoccluded | `-xsn` | `-hop` | free shaft |\n| --- | --- | --- | --- |");
     let shares = [unoccluded, proved(&cuboids), proved(&hops), free].map(share);
     println!("| {:.1} % | {:.1} % | {:.1} % | {:.1} % |", shares[0], shares[1], shares[2], shares[3]);
