@@ -15,7 +15,7 @@ fn the_builtin_boxes_load_and_say_what_the_design_says() {
         let of_thesis = *name != "cbox_light";
         assert_eq!(scene.sensor.medium, (!of_thesis).then_some(MediumId(0)));
         assert_eq!(scene.sensor.world_from_camera.w_axis.truncate(), DVec3::new(278.0, 273.0, -789.0));
-        let Projection::Perspective { tan_half_fov_x, lens: None } = scene.sensor.projection else {
+        let Projection::Perspective { tan_half_fov_x, lens: None, .. } = scene.sensor.projection else {
             panic!("{:?}", scene.sensor)
         };
         assert!((tan_half_fov_x - (39.3_f64 / 2.0).to_radians().tan()).abs() < 1e-12);

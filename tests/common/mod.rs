@@ -95,7 +95,7 @@ pub fn empty_scene(size: u32, spp: u32, tan_half_fov: f64) -> Scene {
         emitters: vec![],
         sensor: Sensor {
             world_from_camera: DMat4::IDENTITY,
-            projection: Projection::Perspective { tan_half_fov_x: tan_half_fov, lens: None },
+            projection: Projection::Perspective { tan_half_fov_x: tan_half_fov, lens: None, principal_point: [0.0; 2] },
             near_clip: 1e-9,
             far_clip: 1e6,
             medium: None,

@@ -60,12 +60,12 @@ fn the_integrators_agree_where_their_models_do() {
             let o = Options { integrator, estimator, sampler, spp: Some(spp), seed: Some(seed), ..options() };
             rendered(&scene, &o).image.pixels
         };
-        let traced = image(VOLPATH, Estimator::Thesis, SamplerKind::Independent, 512, 1);
+        let traced = image(VOLPATH, Estimator::Thesis, SamplerKind::Independent, 384, 1);
         let all = Estimator::ALL.into_iter().flat_map(|e| SamplerKind::ALL.map(|s| (Integrator::raymarch(8), e, s)));
         let auto = Integrator::Raymarch(SegmentSamples::Auto);
         let by_need = Estimator::ALL.map(|e| (auto, e, SamplerKind::Independent));
         for (integrator, estimator, sampler) in all.chain(by_need) {
-            let marched = image(integrator, estimator, sampler, 96, 2);
+            let marched = image(integrator, estimator, sampler, 64, 2);
             let n = traced.len() as f64;
             let differences: Vec<f64> = traced.iter().zip(&marched).map(|(a, b)| f64::from(a.x - b.x)).collect();
             let mean = differences.iter().sum::<f64>() / n;

@@ -57,7 +57,9 @@ fn in_unbounded_fog() {
 fn in_boxes_of_fog() {
     for way in WAYS {
         let mut check = Check::by("single scattering, bounded", way);
-        for phase in [PHASES[0], PHASES[1], Phase::Rayleigh, Phase::TwoLobes { weight: 0.3, g: [0.9, -0.6] }] {
+        let two_lobes = Phase::TwoLobes { weight: 0.3, g: [0.9, -0.6] };
+        // What a boundary does has no part in what a phase function does: of the others one case each.
+        for (phase, kept) in [(PHASES[0], 0..6), (PHASES[1], 0..6), (Phase::Rayleigh, 0..1), (two_lobes, 1..2)] {
             let fog = |min: Vec3, max: Vec3, sigma_t| Fog { min, max, sigma_t, albedo: 0.8, phase };
             let around = fog(vec3(-1.0, -1.0, -1.0), vec3(1.0, 1.5, 4.0), 0.7);
             let ahead = fog(vec3(-1.0, -1.5, 1.0), vec3(1.0, 1.0, 4.0), 0.9);
@@ -71,8 +73,8 @@ fn in_boxes_of_fog() {
                 ("three media, light in the second", &[ahead, next, after], dvec3(-0.2, 0.6, 4.4)),
                 ("three media, light behind them", &[ahead, next, after], dvec3(0.4, 0.3, 8.0)),
             ];
-            for (case, fogs, light) in cases {
-                compare(&mut check, &format!("{phase:?}, {case}"), fogs, light);
+            for (case, fogs, light) in &cases[kept] {
+                compare(&mut check, &format!("{phase:?}, {case}"), fogs, *light);
             }
         }
     }

@@ -246,7 +246,8 @@ fn case_41_peaked_phase_functions() {
 fn case_42_a_light_on_the_camera_ray() {
     for (x, z) in [(0.0, 3.0), (0.0, 1.5), (0.0, 1.2), (1e-17, 3.0), (1e-12, 3.0), (1e-6, 6.0), (0.0, 7.0)] {
         let mut scene = room(&[dvec3(4.0 + x, 4.0, z)]);
-        scene.sensor.projection = Projection::Perspective { tan_half_fov_x: 1e-12, lens: None };
+        scene.sensor.projection =
+            Projection::Perspective { tan_half_fov_x: 1e-12, lens: None, principal_point: [0.0; 2] };
         same_for_all_methods(&format!("light at {x}, {z}"), &scene, 1.0);
     }
 }

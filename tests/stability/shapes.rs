@@ -38,7 +38,8 @@ fn grazing_rays_along_walls() {
         let mut scene = room(&[dvec3(2.0, 6.0, 3.0)]);
         scene.sensor.world_from_camera = DMat4::from_translation(dvec3(4.0, y, 1.5));
         scene.sensor.medium = None;
-        scene.sensor.projection = Projection::Perspective { tan_half_fov_x: 1e-9, lens: None };
+        scene.sensor.projection =
+            Projection::Perspective { tan_half_fov_x: 1e-9, lens: None, principal_point: [0.0; 2] };
         same_for_all_methods(&format!("camera at height {y}"), &scene, 1.0);
     }
 }

@@ -36,11 +36,13 @@ impl Camera {
     #[must_use]
     pub fn ray(&self, x: f64, y: f64, reach: f64) -> CameraRay {
         let [width, height] = self.size;
-        let Projection::Perspective { tan_half_fov_x: t, .. } = self.sensor.projection else {
+        let Projection::Perspective { tan_half_fov_x: t, principal_point: [px, py], .. } = self.sensor.projection
+        else {
             let (origin, slope) = self.sensor.ray(1.0 - 2.0 * x / width, 1.0 - 2.0 * y / height, width / height);
             return self.between_planes(origin, slope, reach);
         };
-        let slope = dvec3((1.0 - 2.0 * x / width) * t, (1.0 - 2.0 * y / height) * t * height / width, 1.0);
+        let (left, up) = (1.0 - 2.0 * x / width - 2.0 * px, 1.0 - 2.0 * y / height - 2.0 * py);
+        let slope = dvec3(left * t, up * t * height / width, 1.0);
         let (p, q, direction) = self.clipped(|depth| slope * depth, slope, reach);
         CameraRay { origin: self.position(), segment: Segment::new(p, q), direction }
     }
@@ -114,25 +116,46 @@ mod tests {
 
     use super::*;
 
-    /// Numbers that Mitsuba 3.9.1 prints for the corner of a film of 200 × 120 pixels, a camera that is scaled by (1.5, 2, 3) and turned, and clip planes at 1 and 7.
-    #[test]
-    fn parallel_rays_are_those_of_mitsuba() {
-        let film = FilmSettings {
+    fn film() -> FilmSettings {
+        FilmSettings {
             width: 200,
             height: 120,
             crop: PixelRect { x0: 0, y0: 0, x1: 200, y1: 120 },
             filter: ReconstructionFilter::Box,
             component_format: ComponentFormat::Float32,
-        };
+        }
+    }
+
+    fn sensor(projection: Projection) -> Sensor {
+        Sensor { world_from_camera: DMat4::IDENTITY, projection, near_clip: 3.0, far_clip: 9.0, medium: None }
+    }
+
+    /// Slopes that Mitsuba 3.9.1 prints for the corner and the middle of a film of 200 × 120 pixels, fov 60 and offsets of 0.25 and −0.125.
+    #[test]
+    fn the_axis_meets_the_film_where_mitsuba_has_it() {
+        let tan_half_fov_x = 30_f64.to_radians().tan();
+        let perspective = Projection::Perspective { tan_half_fov_x, lens: None, principal_point: [0.25, -0.125] };
+        let sensor = sensor(perspective);
+        let camera = Camera::new(&sensor, &film());
+        for (x, y, expected) in [(0.0, 0.0, [0.28867516, 0.43301272]), (100.0, 60.0, [-0.288675, 0.08660255])] {
+            let d = camera.ray(x, y, 1e9).direction;
+            assert!((d.x / d.z - expected[0]).abs() < 1e-6 && (d.y / d.z - expected[1]).abs() < 1e-6, "{d}");
+            // The other way to the same ray.
+            let (_, slope) = sensor.ray(1.0 - x / 100.0, 1.0 - y / 60.0, 200.0 / 120.0);
+            assert!((slope.normalize() - d).length() < 1e-12, "{slope} {d}");
+        }
+    }
+
+    /// Numbers that Mitsuba 3.9.1 prints for the corner of a film of 200 × 120 pixels, a camera that is scaled by (1.5, 2, 3) and turned, and clip planes at 1 and 7.
+    #[test]
+    fn parallel_rays_are_those_of_mitsuba() {
         // Forward is +X, up +Z, so that left is +Y.
         let axes = [DVec3::Y, DVec3::Z, DVec3::X].map(|a| a.extend(0.0));
         let sensor = Sensor {
             world_from_camera: DMat4::from_cols(axes[0], axes[1], axes[2], dvec3(-5.0, 0.5, 3.0).extend(1.0)),
-            projection: Projection::Orthographic { half_width: 1.5, half_height: 1.2 },
-            near_clip: 3.0,
-            far_clip: 9.0,
-            medium: None,
+            ..sensor(Projection::Orthographic { half_width: 1.5, half_height: 1.2 })
         };
+        let film = film();
         let ray = Camera::new(&sensor, &film).ray(0.0, 0.0, 1e9);
         assert_eq!((ray.segment.p, ray.segment.q), (dvec3(-2.0, 2.0, 4.2), dvec3(4.0, 2.0, 4.2)));
         assert_eq!((ray.direction, ray.origin), (DVec3::X, dvec3(-5.0, 2.0, 4.2)));

@@ -122,8 +122,10 @@ impl Sobol {
         }
         let even = f64::from(self.four[(self.dimension % 4) as usize]);
         self.dimension += 1;
-        // So many bits that the sum is exact, and below 1.
-        even + (random * (STEP.recip() * 128.0)).floor() * (STEP * STEP / 128.0)
+        // So many bits that the sum is exact, and below 1. `floor` would be a call where the processor may be an old one.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "below 2³⁰")]
+        let low = (random * (STEP.recip() * 128.0)) as i32 as f64;
+        even + low * (STEP * STEP / 128.0)
     }
 }
 

@@ -363,8 +363,13 @@ impl Sum {
     fn sensor(&mut self, Sensor { world_from_camera, projection, near_clip, far_clip, medium }: &Sensor) {
         self.doubles(&world_from_camera.to_cols_array());
         match projection {
-            Projection::Perspective { tan_half_fov_x, lens } => {
+            Projection::Perspective { tan_half_fov_x, lens, principal_point } => {
                 self.doubles(&[*tan_half_fov_x, *near_clip, *far_clip]);
+                // In the middle it leaves the checksums of older files as they are.
+                if *principal_point != [0.0; 2] {
+                    self.doubles(principal_point);
+                    self.words(&[2]);
+                }
                 if let Some(Lens { radius, focus_distance }) = lens {
                     self.doubles(&[*radius, *focus_distance]);
                 }

@@ -271,6 +271,8 @@ pub enum Projection {
         tan_half_fov_x: f64,
         /// The lens, if it is no pinhole.
         lens: Option<Lens>,
+        /// How far left of the film's middle the camera's axis meets it, and how far above, in widths and heights of the film.
+        principal_point: [f64; 2],
     },
     /// Parallel ones along +Z.
     Orthographic {
@@ -287,7 +289,9 @@ impl Sensor {
     #[must_use]
     pub fn ray(&self, x: f64, y: f64, aspect: f64) -> (DVec3, DVec3) {
         match self.projection {
-            Projection::Perspective { tan_half_fov_x: t, .. } => (DVec3::ZERO, DVec3::new(x * t, y * t / aspect, 1.0)),
+            Projection::Perspective { tan_half_fov_x: t, principal_point: [px, py], .. } => {
+                (DVec3::ZERO, DVec3::new((x - 2.0 * px) * t, (y - 2.0 * py) * t / aspect, 1.0))
+            }
             Projection::Orthographic { half_width, half_height } => {
                 (DVec3::new(x * half_width, y * half_height, 0.0), DVec3::Z)
             }

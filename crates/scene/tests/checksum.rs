@@ -41,7 +41,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         change(&mut changed);
         assert_eq!(changed.checksum(), scene.checksum());
     }
-    let other: [fn(&mut Scene); 40] = [
+    let other: [fn(&mut Scene); 42] = [
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
@@ -60,7 +60,17 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.media[0].albedo = Albedo::Grid(grid(1.0, Wrap::Clamp)),
         |s| s.media[0].phase = Phase::HenyeyGreenstein { g: 0.0 },
         |s| s.emitters.reverse(),
-        |s| s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens: None },
+        |s| {
+            s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens: None, principal_point: [0.0; 2] }
+        },
+        |s| {
+            s.sensor.projection =
+                Projection::Perspective { tan_half_fov_x: 1.5, lens: None, principal_point: [0.5, 0.0] }
+        },
+        |s| {
+            s.sensor.projection =
+                Projection::Perspective { tan_half_fov_x: 1.5, lens: None, principal_point: [0.0, 0.5] }
+        },
         |s| s.sensor.projection = Projection::Orthographic { half_width: 1.5, half_height: 1.0 },
         |s| s.sensor.projection = Projection::Orthographic { half_width: 1.0, half_height: 1.5 },
         |s| s.sensor.world_from_camera.w_axis.x += 1.0,
@@ -72,7 +82,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.surfaces[0].attributes = Arc::new(MeshAttributes { normals: vec![[Vec3::X; 3]], uvs: vec![] }),
         |s| {
             let lens = Some(Lens { radius: 1.0, focus_distance: 2.0 });
-            s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens };
+            s.sensor.projection = Projection::Perspective { tan_half_fov_x: 1.5, lens, principal_point: [0.0; 2] };
         },
         |s| s.surfaces[0].bsdf = turned(Perturbation::Normals(Texture::grey(0.5)), true, true),
         |s| s.surfaces[0].bsdf = turned(Perturbation::Heights { texture: Texture::grey(0.5), scale: 0.0 }, true, true),

@@ -30,7 +30,7 @@ fn scene() -> Scene {
         emitters: [0.0, 1.0].map(|x| Emitter::Point { position: DVec3::splat(x), intensity: white }).to_vec(),
         sensor: Sensor {
             world_from_camera: DMat4::IDENTITY,
-            projection: Projection::Perspective { tan_half_fov_x: 1.0, lens: None },
+            projection: Projection::Perspective { tan_half_fov_x: 1.0, lens: None, principal_point: [0.0; 2] },
             near_clip: 0.1,
             far_clip: 10.0,
             medium: None,

@@ -35,9 +35,6 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     };
     let world_from_camera = rigid(loader, &object, world_from_camera)?;
     object.without_effect(loader, &["shutter_open", "shutter_close", "sample_border", "use_radiance"])?;
-    for name in ["principal_point_offset_x", "principal_point_offset_y"] {
-        object.float_where(name, 0.0, |v| v == 0.0, "0: nothing else is supported")?;
-    }
     let near_clip = object.float_where("near_clip", 0.01, |v| v > 0.0, "positive")?;
     let far_clip = object.float_where("far_clip", 1e4, |v| v > near_clip, "more than near_clip")?;
     // As in Mitsuba, the camera's scale moves the near plane, and the far one stays as far behind it.
@@ -59,7 +56,8 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let projection = if is_orthographic {
         Projection::Orthographic { half_width: scale.x, half_height: scale.y / aspect }
     } else {
-        Projection::Perspective { tan_half_fov_x: field_of_view(&mut object, aspect)?, lens }
+        let principal_point = if object.kind() == "perspective" { principal_point(&mut object)? } else { [0.0; 2] };
+        Projection::Perspective { tan_half_fov_x: field_of_view(&mut object, aspect)?, lens, principal_point }
     };
     object.finish()?;
     let sensor = Sensor { world_from_camera, projection, near_clip, far_clip, medium };
@@ -112,6 +110,12 @@ fn lens(loader: &Loader<'_>, object: &mut Object<'_>, far_clip: f64) -> Result<O
     let radius = object.float_where("aperture_radius", 0.0, |v| v >= 0.0, "at least 0")?;
     let focus_distance = object.float_where("focus_distance", far_clip, |v| v > 0.0, "positive")?;
     Ok((radius > 0.0).then_some(Lens { radius, focus_distance }))
+}
+
+/// Where the axis meets the film: as Mitsuba takes them, a positive offset goes left and up.
+fn principal_point(object: &mut Object<'_>) -> Result<[f64; 2], SceneError> {
+    let mut offset = |name| object.float_where(name, 0.0, f64::is_finite, "a number");
+    Ok([offset("principal_point_offset_x")?, offset("principal_point_offset_y")?])
 }
 
 /// tan(X/2), X the horizontal field of view.

@@ -198,6 +198,22 @@ fn one_of_several_sensors_is_chosen() {
     assert!(message.contains("no sensor 2") && message.contains("it has 2"), "{message}");
 }
 
+/// Of `perspective` only, as in Mitsuba.
+#[test]
+fn the_axis_may_meet_the_film_off_its_middle() {
+    let text = |kind: &str, inner: &str| {
+        format!(
+            "{HEAD}<shape type='cube'/><sensor type='{kind}'>{FILM}<float name='fov' value='40'/>{inner}\
+             <float name='principal_point_offset_x' value='0.25'/><float name='principal_point_offset_y' value='-0.5'/></sensor>{LIGHT}</scene>"
+        )
+    };
+    let sensor = load_with(&text("perspective", ""), &[], &[]).unwrap().sensor;
+    let Projection::Perspective { principal_point, .. } = sensor.projection else { panic!("{sensor:?}") };
+    assert_eq!(principal_point, [0.25, -0.5]);
+    let lens = text("thinlens", "<float name='aperture_radius' value='1'/>");
+    assert!(load_with(&lens, &[], &[]).unwrap_err().to_string().contains("principal_point_offset_x"));
+}
+
 /// What the camera's scale stretches is what it sees; the near plane moves with it, and the far one stays as far behind.
 #[test]
 fn an_orthographic_camera_sees_what_its_scale_says() {
