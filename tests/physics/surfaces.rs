@@ -5,11 +5,12 @@ use std::f64::consts::PI;
 use glam::{DVec3, dvec3, vec3};
 use vdf::{
     geometry::Triangle,
+    render::Estimator,
     scene::{Bsdf, Emitter, IntegratorSettings, Phase, Rgb, Scene, Surface},
 };
 
 use crate::{
-    check::{Check, INTEGRATORS, VOLPATH},
+    check::{Check, INTEGRATORS, RAYMARCH, TRACED, VOLPATH},
     common::empty_scene,
     fog::{Fog, add_fogs, optical_depth, single_scattering},
     furnace::gauss_legendre,
@@ -135,8 +136,8 @@ fn by_an_area_light() {
     assert!((irradiance(&[]) - lambert).abs() < 1e-9 * lambert, "{} is not {lambert}", irradiance(&[]));
 
     let fog = Fog::absorbing(vec3(-1.0, -1.0, 1.25), vec3(2.0, 1.0, 1.75), 2.0);
-    for integrator in INTEGRATORS {
-        let mut check = Check::new("wall lit by an area light", integrator);
+    for way in [TRACED[0], TRACED[1], (RAYMARCH, Estimator::Thesis)] {
+        let mut check = Check::by("wall lit by an area light", way);
         for (case, fogs) in [("vacuum", &[][..]), ("absorbing fog", &[fog])] {
             let mut scene = wall(REFLECTANCE);
             add_fogs(&mut scene, fogs);
@@ -152,7 +153,7 @@ fn by_an_area_light() {
             scene.emitters.push(Emitter::Area { surface: 1 });
             let through = (-optical_depth(fogs, DVec3::ZERO, SEEN)).exp();
             let expected = f64::from(REFLECTANCE) / PI * irradiance(fogs) * through;
-            check.mean(case, &check.render(&scene, 256), expected);
+            check.mean(case, &check.render(&scene, 192), expected);
         }
     }
 }

@@ -11,6 +11,8 @@
 //! at most 1/(1 − c). Without it the variance beside a point light is infinite. The share is the smaller the more fog there is before the
 //! light, and from a surface also the less there is, for then light comes from other surfaces.
 //!
+//! *The last ray* of a path that may not scatter again flies nowhere: it arrives, and is worth its transmittance. Where no ray can meet a light it is not cast.
+//!
 //! *Why it is unbiased.* Both mixtures are one-sample estimates with the balance heuristic \[Veach1997\], given emitter and place, which are drawn before
 //! and independently. The emitter that directions go to is drawn apart from that of next-event estimation: where the two
 //! compete for light, each is weighted with the same densities, given the former.
@@ -64,6 +66,10 @@ impl<R: Recorder> Tracer<'_, R> {
         let mean_free_path = media.least_sigma_t().recip();
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
+            let is_last = !self.may_scatter(path.depth + 1);
+            if is_last && !lights.may_be_met() {
+                break;
+            }
             let direction = path.ray.direction;
             let (u, u_place) = (sampler.next_1d(), sampler.next_2d());
             let (place, u) = match choose(u, lights.count()) {
@@ -72,20 +78,15 @@ impl<R: Recorder> Tracer<'_, R> {
             };
             let towards = place.and_then(|place| lights.point_position(place.emitter()));
             let towards = towards.map(|position| LightPlace { position, normal: None });
-            // Who may not scatter again looks for no place to do so.
-            let near = |light: &LightPlace| {
-                self.may_scatter(path.depth + 1) && light.passed_at(path.ray.segment.p, direction) < mean_free_path
-            };
+            let near = |light: &LightPlace| light.passed_at(path.ray.segment.p, direction) < mean_free_path;
             let event = match towards.filter(near) {
+                _ if is_last => self.arrival(&mut path, counters),
                 Some(light) => self.event_near_light(&mut path, &light, u, counters),
                 None => self.first_event(&mut path, -(-u).ln_1p(), counters),
             };
             match event {
                 Event::Collision { point, medium, regions } => {
                     path.depth += 1;
-                    if !self.may_scatter(path.depth) {
-                        break;
-                    }
                     let (albedo, phase) = media.scattering(medium, point);
                     path.throughput *= albedo;
                     let vertex = Vertex::InMedium { phase, direction };
@@ -141,6 +142,16 @@ impl<R: Recorder> Tracer<'_, R> {
             }
         }
         path.radiance
+    }
+
+    /// The arrival at the end of the path's ray; the path is worth what passes the media before it.
+    fn arrival(&self, path: &mut Path, counters: &mut Counters) -> Event {
+        let media = &self.world.media;
+        let (surface, free) = self.cast(&path.ray, counters);
+        path.throughput *= to_f32((-media.optical_depth(&free, &path.ray.regions)).exp());
+        let regions = media.at_end(&free, &path.ray.regions);
+        self.crosses_to(path, &regions);
+        Event::Arrival { surface, regions }
     }
 
     /// The event on the path's ray by the mixture of distances, from a uniform number; the path gets its weight.

@@ -33,6 +33,7 @@ pub struct Lights {
     envmap: Option<usize>,
     /// How far a direction is followed before it is infinitely far away, in world units.
     reach: f64,
+    may_be_met: bool,
 }
 
 #[derive(Debug)]
@@ -130,7 +131,9 @@ impl Lights {
         let points: Vec<_> = lights.iter().enumerate().filter_map(point).collect();
         let others = (0..lights.len()).filter(|i| points.iter().all(|(point, ..)| point != i)).collect();
         let envmap = lights.iter().position(|l| matches!(l, Light::Envmap(_)));
-        Self { all: (0..lights.len()).collect(), lights, points, others, background, envmap, reach }
+        let may_be_met =
+            background != Rgb::ZERO || envmap.is_some() || scene.surfaces.iter().any(|s| s.radiance.is_some());
+        Self { all: (0..lights.len()).collect(), lights, points, others, background, envmap, reach, may_be_met }
     }
 
     /// Radiance of a ray that leaves the scene in the unit direction `direction`.
@@ -159,6 +162,12 @@ impl Lights {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
         let emitter = ((u_emitter * n as f64) as usize).min(n.checked_sub(1)?);
         self.seen_from(from, &self.sample_point(emitter, u)?)
+    }
+
+    /// Whether a ray may meet any light: there is a background, or a surface that shines.
+    #[inline]
+    pub(crate) const fn may_be_met(&self) -> bool {
+        self.may_be_met
     }
 
     /// How many emitters there are.

@@ -50,6 +50,8 @@ pub(crate) struct Grid {
     cells: [i64; 3],
     /// The index of the lower value of the first cell.
     first: [i64; 3],
+    /// Numbers from a value to the next one along each axis.
+    strides: [usize; 3],
     bricks: Bricks,
 }
 
@@ -90,7 +92,9 @@ impl Grid {
         let origin = DVec3::from_array(first.map(|i| i as f64));
         let to_cells = DMat4::from_translation(-origin) * values_from_world;
         let cells_from_world = DAffine3::from_mat3_translation(DMat3::from_mat4(to_cells), to_cells.w_axis.truncate());
+        let [nx, ny, _] = size.map(|n| n as usize);
         let mut new = Self {
+            strides: [1, nx, nx * ny].map(|stride| stride * grid.channels()),
             values: Arc::clone(grid),
             filter: *filter,
             wrap: *wrap,
@@ -211,11 +215,14 @@ impl Grid {
     /// The indices of the two values that a cell lies between, along one axis; in numbers from the start of the values.
     #[inline]
     fn ends(&self, axis: usize, cell: i64) -> [usize; 2] {
+        [self.end(axis, cell), self.end(axis, cell + 1)]
+    }
+
+    /// The index of the lower value of a cell.
+    #[inline]
+    fn end(&self, axis: usize, cell: i64) -> usize {
         let n = i64::from(self.values.size()[axis]);
-        let [nx, ny, _] = self.values.size().map(|n| n as usize);
-        let stride = [1, nx, nx * ny][axis] * self.values.channels();
-        let low = self.first[axis] + cell;
-        [self.wrap.pixel(low, n) as usize * stride, self.wrap.pixel(low + 1, n) as usize * stride]
+        self.wrap.pixel(self.first[axis] + cell, n) as usize * self.strides[axis]
     }
 
     /// True if all values of these cells, from the first to before the last along each axis, are zero.

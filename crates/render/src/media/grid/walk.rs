@@ -117,7 +117,8 @@ impl<'g> Ray<'g> {
     #[inline]
     fn cell_at(&self, axis: usize, t: f64) -> i64 {
         let last = self.grid.cells[axis] - 1;
-        let mut cell = ((self.origin[axis] + t * self.rate[axis]).floor() as i64).clamp(0, last);
+        // What is below 0 is cut off towards it, so that no `floor` is needed.
+        let mut cell = ((self.origin[axis] + t * self.rate[axis]) as i64).clamp(0, last);
         if self.rate[axis] > 0.0 {
             while cell > 0 && self.passes(axis, cell) > t {
                 cell -= 1;
@@ -184,8 +185,7 @@ impl<'g> Ray<'g> {
                 return ControlFlow::Continue(());
             }
             let step = if self.rate[axis] > 0.0 { 1 } else { -1 };
-            walk.cell[axis] += step;
-            walk.enter(axis);
+            walk.step(axis, step);
             is_new_brick = Bricks::is_entered(walk.cell[axis], step);
         }
     }
@@ -198,6 +198,17 @@ impl<const CHANNELS: usize> Walk<'_, '_, CHANNELS> {
         let cell = self.cell[axis];
         self.leave[axis] = self.ray.leaves(axis, cell, cell);
         self.ends[axis] = self.ray.grid.ends(axis, cell);
+    }
+
+    /// Enters the next cell along an axis, up or down: it shares a face, and so an end.
+    #[inline]
+    fn step(&mut self, axis: usize, step: i64) {
+        let grid = self.ray.grid;
+        self.cell[axis] += step;
+        let cell = self.cell[axis];
+        self.leave[axis] = self.ray.leaves(axis, cell, cell);
+        let [low, high] = self.ends[axis];
+        self.ends[axis] = if step > 0 { [high, grid.end(axis, cell + 1)] } else { [grid.end(axis, cell), low] };
     }
 
     /// The axis along which the cell is left first.
