@@ -53,6 +53,9 @@ pub struct SegmentTest {
     slack: f64,
 }
 
+/// [`SegmentTest`]'s axes by the last, for a segment that points forwards along it and for one that points backwards.
+const AXES: [[usize; 3]; 6] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [2, 1, 0], [0, 2, 1], [1, 0, 2]];
+
 /// Half an ulp of 1 in double precision.
 const U: f64 = f64::EPSILON / 2.0;
 
@@ -73,24 +76,18 @@ impl SegmentTest {
     }
 
     /// The same; the slack is the bounds' [`slack`], which need not be computed for every segment.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn within(segment: Segment, bounds: &Bounds, slack: f64) -> Self {
         let Bounds { min, max } = *bounds;
         let d = segment.q - segment.p;
         let a = d.abs();
-        let z = if a.x > a.y {
-            if a.x > a.z { 0 } else { 2 }
-        } else if a.y > a.z {
-            1
-        } else {
-            2
-        };
-        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
+        // Without branches, which would be guessed wrongly as often as not.
+        let (first, larger) = if a.x > a.y { (0, a.x) } else { (1, a.y) };
+        let z = if larger > a.z { first } else { 2 };
         let vector = d;
         let d = d.to_array();
-        if d[z] < 0.0 {
-            std::mem::swap(&mut x, &mut y);
-        }
+        let axes = AXES[z + 3 * usize::from(d[z] < 0.0)];
+        let [x, y, _] = axes;
         // A segment of length zero meets nothing; scale 0 makes T and det finite, and the exact test decides.
         let scale_z = if d[z] == 0.0 { 0.0 } else { 1.0 / d[z] };
         // So short a segment that its reciprocal overflows: infinite error bounds leave all to the exact test.
@@ -103,7 +100,7 @@ impl SegmentTest {
             segment,
             direction,
             length,
-            axes: [x, y, z],
+            axes,
             shear: [d[x] * scale_z, d[y] * scale_z],
             scale: scale_z,
             edge_error: if usable { 128.0 * U * m2 } else { f64::INFINITY },
@@ -143,6 +140,24 @@ impl SegmentTest {
     #[inline]
     pub(crate) const fn shear(&self) -> [f64; 2] {
         self.shear
+    }
+
+    /// The reciprocal of the largest component, with its sign; 0 for a segment of length zero.
+    #[inline]
+    pub(crate) const fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// The largest error of an edge function, for triangles in the bounds given.
+    #[inline]
+    pub(crate) const fn edge_error(&self) -> f64 {
+        self.edge_error
+    }
+
+    /// The largest error of `T` and of `T − det`.
+    #[inline]
+    pub(crate) const fn t_error(&self) -> f64 {
+        self.t_error
     }
 
     /// Exactly: do segment and triangle meet? If so, where (rounded)?
@@ -198,17 +213,24 @@ impl SegmentTest {
                 return None;
             }
             if t_det > e && t_det - det < -e {
-                let inv_det = 1.0 / det;
-                let scale = inv_det * sign;
-                let hit = TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] };
-                if self.t_error * self.length > self.slack * det {
-                    return Some(self.put_into_box(hit, &triangle()));
-                }
-                return Some(hit);
+                return Some(self.certain_hit([u, v, w], t_det * sign, triangle));
             }
         }
         let triangle = triangle();
         intersect_exact(&self.segment, &triangle).map(|hit| self.put_into_box(hit, &triangle))
+    }
+
+    /// Where a triangle is hit that is hit for certain, from its edge functions and `T`.
+    #[inline(always)]
+    pub(crate) fn certain_hit(&self, edges: [f64; 3], t_det: f64, triangle: impl FnOnce() -> Triangle) -> TriangleHit {
+        let [u, v, w] = edges;
+        let det = u + v + w;
+        let sign = det.signum();
+        let (t_det, det) = (t_det * sign, det * sign);
+        let inv_det = 1.0 / det;
+        let scale = inv_det * sign;
+        let hit = TriangleHit { t: t_det * inv_det, barycentric: [u * scale, v * scale, w * scale] };
+        if self.t_error * self.length > self.slack * det { self.put_into_box(hit, &triangle()) } else { hit }
     }
 
     /// The hit with its place put into the box of the triangle, enlarged by the slack.

@@ -75,6 +75,16 @@ impl Child {
     }
 
     #[inline]
+    pub(super) fn bits(self) -> u32 {
+        self.0
+    }
+
+    #[inline]
+    pub(super) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
+    #[inline]
     pub(super) fn index(self) -> usize {
         (self.0 >> 3) as usize
     }
@@ -125,6 +135,11 @@ impl Leaf {
             }
         }
         leaf
+    }
+
+    /// How many triangles it has.
+    pub(super) fn count(&self) -> u32 {
+        self.numbers.iter().map(|&number| u32::from(number != NONE)).sum()
     }
 
     #[inline]

@@ -23,10 +23,11 @@
 //! Segments that start far away are traced from their end or tested against all triangles, and nothing is culled by t.
 //!
 //! What a ray is before it comes to the tree is decided here; `space` is the tree's own space and its padding, `layout`
-//! what the tree is made of, `build` how it comes about, `traverse` the way of a ray, `leaf` the triangles at its end, `wedge` the way of
+//! what the tree is made of, `build` how it comes about, `lanes` what it is computed with, `traverse` the way of a ray, `leaf` the triangles at its end, `wedge` the way of
 //! all rays from a segment to a point at once.
 
 mod build;
+mod lanes;
 mod layout;
 mod leaf;
 mod reinsert;
@@ -39,8 +40,10 @@ mod wedge;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
+use pulp::Arch;
 
 use self::{
+    lanes::{InLanes, Lanes, dispatch},
     layout::Tree,
     space::{TreeDistance, TreeSpace},
     traverse::Start,
@@ -68,6 +71,8 @@ pub struct Bvh {
     space: TreeSpace,
     /// The [`slack`] of the bounds.
     slack: f64,
+    /// The registers of the machine.
+    arch: Arch,
 }
 
 impl std::fmt::Debug for Bvh {
@@ -98,7 +103,8 @@ impl Bvh {
     pub fn new(triangles: &[Triangle]) -> Self {
         let bounds = Bounds::of_triangles(triangles);
         let space = TreeSpace::new(&bounds);
-        Self { tree: Tree::build(triangles, space), triangles: triangles.len(), bounds, space, slack: slack(&bounds) }
+        let tree = Tree::build(triangles, space);
+        Self { tree, triangles: triangles.len(), bounds, space, slack: slack(&bounds), arch: Arch::new() }
     }
 
     /// Bounds of the triangles; empty if there are none.
@@ -118,69 +124,22 @@ impl Bvh {
     #[inline]
     #[must_use]
     pub fn intersect(&self, segment: &Segment) -> Option<Hit> {
-        if self.bounds.misses(segment) {
-            return None;
-        }
-        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
-        let mut best: Option<Hit> = None;
-        let (ray, start) = match self.approach(&test) {
-            Approach::Miss => return None,
-            Approach::Ray(ray, start) => (ray, start),
-            // Last things first: nothing can be culled.
-            Approach::Backwards(ray) => (ray, f64::NEG_INFINITY),
-            Approach::Far => {
-                // As numbers: −0 is no less than 0, here as in the tree.
-                let t = |hit: &Hit| hit.t + 0.0;
-                return self.all_hits(&test).min_by(|a, b| t(a).total_cmp(&t(b)).then(a.triangle.cmp(&b.triangle)));
-            }
-        };
-        self.tree.traverse(ray, &test, self.space, |hit, triangle| {
-            if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
-                best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
-            }
-            // Boxes beyond the hit are culled, but not those that may hold one with the same t or less.
-            self.space.end(hit.t * test.length() - start)
-        });
-        best
+        if self.bounds.misses(segment) { None } else { dispatch(self.arch, Intersect { bvh: self, segment }) }
     }
 
     /// Whether any triangle meets the closed segment: the same as `intersect(segment).is_some()`, but faster.
     #[inline]
     #[must_use]
     pub fn occluded(&self, segment: &Segment) -> bool {
-        if self.bounds.misses(segment) {
-            return false;
-        }
-        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
-        let ray = match self.approach(&test) {
-            Approach::Miss => return false,
-            Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
-            Approach::Far => return self.all_hits(&test).next().is_some(),
-        };
-        let mut occluded = false;
-        self.tree.traverse(ray, &test, self.space, |_, _| {
-            occluded = true;
-            TreeDistance::NEG_INFINITY
-        });
-        occluded
+        !self.bounds.misses(segment) && dispatch(self.arch, Occluded { bvh: self, segment })
     }
 
     /// Calls `visit` with every triangle that the closed segment meets, in no particular order.
     #[inline]
-    pub fn visit_hits(&self, segment: &Segment, mut visit: impl FnMut(Hit)) {
-        if self.bounds.misses(segment) {
-            return;
+    pub fn visit_hits(&self, segment: &Segment, visit: impl FnMut(Hit)) {
+        if !self.bounds.misses(segment) {
+            dispatch(self.arch, VisitHits { bvh: self, segment, visit });
         }
-        let test = SegmentTest::within(*segment, &self.bounds, self.slack);
-        let ray = match self.approach(&test) {
-            Approach::Miss => return,
-            Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
-            Approach::Far => return self.all_hits(&test).for_each(visit),
-        };
-        self.tree.traverse(ray, &test, self.space, |hit, triangle| {
-            visit(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
-            TreeDistance::INFINITY
-        });
     }
 
     /// Calls `visit` with every triangle that comes between `apex` and a point of `segment` ([`Segment::at`] for some t in [0, 1]), with some
@@ -238,5 +197,85 @@ impl Bvh {
         let start = self.passes(origin, direction, length, self.space.pad())?;
         let origin = origin + direction * start;
         Some((Start { origin, direction, end: self.space.end(length - start) }, start))
+    }
+}
+
+struct Intersect<'a> {
+    bvh: &'a Bvh,
+    segment: &'a Segment,
+}
+
+impl InLanes for Intersect<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) -> Option<Hit> {
+        let bvh = self.bvh;
+        let test = SegmentTest::within(*self.segment, &bvh.bounds, bvh.slack);
+        let mut best: Option<Hit> = None;
+        let (ray, start) = match bvh.approach(&test) {
+            Approach::Miss => return None,
+            Approach::Ray(ray, start) => (ray, start),
+            // Last things first: nothing can be culled.
+            Approach::Backwards(ray) => (ray, f64::NEG_INFINITY),
+            Approach::Far => {
+                // As numbers: −0 is no less than 0, here as in the tree.
+                let t = |hit: &Hit| hit.t + 0.0;
+                return bvh.all_hits(&test).min_by(|a, b| t(a).total_cmp(&t(b)).then(a.triangle.cmp(&b.triangle)));
+            }
+        };
+        bvh.tree.visit_hits(ray, &test, bvh.space, lanes, |hit, triangle| {
+            if best.is_none_or(|b| (hit.t, triangle) < (b.t, b.triangle)) {
+                best = Some(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
+            }
+            // Boxes beyond the hit are culled, but not those that may hold one with the same t or less.
+            bvh.space.end(hit.t * test.length() - start)
+        });
+        best
+    }
+}
+
+struct Occluded<'a> {
+    bvh: &'a Bvh,
+    segment: &'a Segment,
+}
+
+impl InLanes for Occluded<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) -> bool {
+        let bvh = self.bvh;
+        let test = SegmentTest::within(*self.segment, &bvh.bounds, bvh.slack);
+        match bvh.approach(&test) {
+            Approach::Miss => false,
+            Approach::Ray(ray, _) | Approach::Backwards(ray) => bvh.tree.occluded(ray, &test, bvh.space, lanes),
+            Approach::Far => bvh.all_hits(&test).next().is_some(),
+        }
+    }
+}
+
+struct VisitHits<'a, F> {
+    bvh: &'a Bvh,
+    segment: &'a Segment,
+    visit: F,
+}
+
+impl<F: FnMut(Hit)> InLanes for VisitHits<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, lanes: impl Lanes) {
+        let Self { bvh, segment, mut visit } = self;
+        let test = SegmentTest::within(*segment, &bvh.bounds, bvh.slack);
+        let ray = match bvh.approach(&test) {
+            Approach::Miss => return,
+            Approach::Ray(ray, _) | Approach::Backwards(ray) => ray,
+            Approach::Far => return bvh.all_hits(&test).for_each(visit),
+        };
+        bvh.tree.visit_hits(ray, &test, bvh.space, lanes, |hit, triangle| {
+            visit(Hit { triangle, t: hit.t, barycentric: hit.barycentric });
+            TreeDistance::INFINITY
+        });
     }
 }

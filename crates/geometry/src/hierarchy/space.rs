@@ -48,6 +48,12 @@ impl TreeDistance {
     pub(super) const INFINITY: Self = Self(f32::INFINITY);
     /// In front of everything.
     pub(super) const NEG_INFINITY: Self = Self(f32::NEG_INFINITY);
+
+    /// The lesser of both.
+    #[inline(always)]
+    pub(super) fn nearer(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
 }
 
 /// A box in the tree's space. Empty if `min` exceeds `max`.
