@@ -75,6 +75,12 @@ impl Provers {
         {
             return buffer.answer(query.from);
         }
+        self.answer_by_field(query)
+    }
+
+    /// The same where there is no light buffer.
+    #[inline(never)]
+    fn answer_by_field(&self, query: &ShadowQuery) -> Answer {
         match query.kind {
             QueryKind::Spatial => self.answer_spatial(query.emitter, query.from, query.to),
             QueryKind::OnLight => self.answer_on_light(query.emitter, query.from, query.to),

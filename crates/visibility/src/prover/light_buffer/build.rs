@@ -184,7 +184,7 @@ impl LightBuffer {
         if budget.exceeded() {
             return Err(Refusal::Memory);
         }
-        let buffer = merge(triangles, Cube::new(light, &windows, depths), &windows, &bins, tiles);
+        let buffer = merge(triangles, Cube::new(light, &windows, depths, extent.farthest), &windows, &bins, tiles);
         if buffer.bytes() as u64 > max_bytes { Err(Refusal::Memory) } else { Ok(buffer) }
     }
 }
@@ -378,7 +378,7 @@ impl TileBuilder<'_> {
 
     /// Fills a square of texels that one triangle covers, behind which nothing matters.
     fn fill(&mut self, x: u32, y: u32, size: u32, cone: u32) {
-        let (cone, tag) = (&self.cones[cone as usize], Tag::single(self.numbers[cone as usize]));
+        let (cone, tag) = (&self.cones[cone as usize], Tag::cover(self.numbers[cone as usize]));
         for (x, y) in (y..y + size).flat_map(|y| (x..x + size).map(move |x| (x, y))) {
             if let Some([near, far]) = cone.depths(&self.window.rect(f64::from(x), f64::from(y), 1.0)) {
                 self.out.texels[place::in_tile(x, y)] =
@@ -447,7 +447,9 @@ impl TileBuilder<'_> {
         let lower = |near| self.depths.lower(near);
         if let [only] = self.scratch[start..] {
             let number = self.numbers[only.cone as usize];
-            return Texel::new(lower(only.near), occluded, Tag::single(number));
+            let covers = self.cones[only.cone as usize].covers(&self.window.rect(x, y, size));
+            let tag = if covers { Tag::cover(number) } else { Tag::single(number) };
+            return Texel::new(lower(only.near), occluded, tag);
         }
         if count == 0 {
             return Texel::EMPTY;

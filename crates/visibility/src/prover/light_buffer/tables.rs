@@ -23,12 +23,14 @@ pub(super) struct Tables {
     end: usize,
 }
 
-/// The same, to look things up in.
+/// The same, to look things up in: bytes, which may start anywhere, so that nothing has to be asked but whether a number is within all.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
-    texels: &'a [Pair],
-    entries: &'a [Pair],
-    records: &'a [Numbers],
+    pairs: &'a [[u8; size_of::<Pair>()]],
+    lines: &'a [[u8; size_of::<Numbers>()]],
+    /// Texels, which are in front of the entries; pairs and lines in front of the records.
+    entries: usize,
+    records: usize,
 }
 
 /// The same, to be filled.
@@ -53,18 +55,9 @@ impl Tables {
     }
 
     #[inline(always)]
-    pub(super) fn texel(&self, number: u32) -> Texel {
-        let texels: &[Pair] = bytemuck::cast_slice(&self.bytes[..self.entries]);
-        Texel::of(texels[number as usize])
-    }
-
-    #[inline(always)]
     pub(super) fn view(&self) -> View<'_> {
-        View {
-            texels: bytemuck::cast_slice(&self.bytes[..self.entries]),
-            entries: bytemuck::cast_slice(&self.bytes[self.entries..self.records]),
-            records: bytemuck::cast_slice(&self.bytes[self.records..self.end]),
-        }
+        let ((pairs, _), (lines, _)) = (self.bytes.as_chunks(), self.bytes.as_chunks());
+        View { pairs, lines, entries: self.entries / size_of::<Pair>(), records: self.records / size_of::<Numbers>() }
     }
 
     pub(super) fn view_mut(&mut self) -> ViewMut<'_> {
@@ -86,28 +79,29 @@ impl PartialEq for Tables {
 
 impl View<'_> {
     #[inline(always)]
-    pub(super) fn texel(&self, number: usize) -> Texel {
-        Texel::of(self.texels[number])
+    pub(super) fn texel(&self, number: u32) -> Texel {
+        Texel::of(bytemuck::cast(self.pairs[number as usize]))
     }
 
     #[inline(always)]
-    pub(super) fn entry(&self, number: usize) -> Entry {
-        Entry::of(self.entries[number])
+    pub(super) fn entry(&self, number: u32) -> Entry {
+        Entry::of(bytemuck::cast(self.pairs[self.entries + number as usize]))
     }
 
     #[inline(always)]
     pub(super) fn record(&self, number: u32) -> Record<'_> {
-        Record(&self.records[number as usize])
+        Record(&self.lines[self.records + number as usize])
     }
 
     #[cfg(test)]
     pub(super) fn texels(&self) -> impl Iterator<Item = Texel> {
-        self.texels.iter().map(|pair| Texel::of(*pair))
+        self.pairs[..self.entries].iter().map(|pair| Texel::of(bytemuck::cast(*pair)))
     }
 
     #[cfg(test)]
     pub(super) fn entries(&self) -> impl Iterator<Item = Entry> {
-        self.entries.iter().map(|pair| Entry::of(*pair))
+        let end = self.records * size_of::<Numbers>() / size_of::<Pair>();
+        self.pairs[self.entries..end].iter().map(|pair| Entry::of(bytemuck::cast(*pair)))
     }
 }
 
