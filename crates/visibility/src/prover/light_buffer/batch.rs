@@ -113,17 +113,21 @@ fn add_differences(differs: &mut [u64; 4], query: &ShadowQuery, [x, y, z]: [u64;
 }
 
 /// The places of a block of queries, field by field as in [`Place`].
+// Each array in cache lines of its own: a number that is read from a vector that was written across two lines waits for the cache.
+#[repr(align(64))]
 struct Places {
     x: [[f32; BLOCK]; 3],
     reach: [f32; BLOCK],
     texel: [u32; BLOCK],
     code: [u32; BLOCK],
+    /// Of each texel.
+    depths: [u32; BLOCK],
 }
 
 impl Places {
     const fn new() -> Self {
         let zero = [0.0; BLOCK];
-        Self { x: [zero; 3], reach: zero, texel: [0; BLOCK], code: [0; BLOCK] }
+        Self { x: [zero; 3], reach: zero, texel: [0; BLOCK], code: [0; BLOCK], depths: [0; BLOCK] }
     }
 
     /// The places of these queries.
@@ -151,10 +155,9 @@ impl Places {
 
     /// The answers by comparisons alone, and a bit for each that they leave open.
     #[inline(always)]
-    fn compare(&self, view: &View<'_>, answers: &mut [Answer]) -> u32 {
+    fn compare(&mut self, view: &View<'_>, answers: &mut [Answer]) -> u32 {
         let n = lanes(answers.len());
-        let mut depths = [0; BLOCK];
-        let (loaded, _) = depths[..n].as_chunks_mut::<LANES>();
+        let (loaded, _) = self.depths[..n].as_chunks_mut::<LANES>();
         let (texels, _) = self.texel[..n].as_chunks::<LANES>();
         for (depths, texels) in loaded.iter_mut().zip(texels) {
             for i in 0..LANES {
@@ -163,7 +166,7 @@ impl Places {
         }
         let (mut found, mut is_open) = ([Answer::Unknown; BLOCK], [false; BLOCK]);
         for i in 0..n {
-            let (lit, open) = compare(self.code[i], depths[i]);
+            let (lit, open) = compare(self.code[i], self.depths[i]);
             // Those that are left open are so until a triangle blocks their way.
             found[i] = Answer::of(!(lit | open));
             is_open[i] = open;
