@@ -73,7 +73,11 @@ impl Provers {
         if let Some(LightProver::Buffer(buffer)) = self.lights.get(query.emitter)
             && query.to == buffer.position()
         {
-            return buffer.answer(query.from);
+            // The same answer either way.
+            return match query.kind {
+                QueryKind::Spatial => buffer.answer_in_space(query.from),
+                _ => buffer.answer(query.from),
+            };
         }
         self.answer_by_field(query)
     }

@@ -14,7 +14,7 @@ use super::{
     place::{Cube, Direction},
     tables::View,
 };
-use crate::ShadowQuery;
+use crate::{QueryKind, ShadowQuery};
 
 /// So many queries go through the stages together: a bit each.
 const BLOCK: usize = 32;
@@ -65,12 +65,19 @@ impl Run<'_> {
         let (cube, view) = (&self.buffer.cube, self.buffer.tables.view());
         let mut places = Places::new();
         let mut done = 0;
+        // Whether squares decide most: a guess from what was asked last, on which no answer depends.
+        let mut squares = self.queries.first().is_some_and(|q| q.kind == QueryKind::Spatial);
         for (queries, answers) in self.queries.chunks(BLOCK).zip(self.answers.chunks_mut(BLOCK)) {
             if !are_towards(queries, self.emitter, cube.light()) {
                 break;
             }
             places.find::<WHOLE>(cube, queries);
-            let open = places.compare(&view, answers);
+            let mut open = places.compare(&view, squares, answers);
+            let left_open = open.count_ones();
+            if squares && open != 0 {
+                open = places.compare_texels(&view, open, answers);
+            }
+            squares = left_open < BLOCK as u32 / 4;
             if open != 0 {
                 self.buffer.test_open(&view, &places, open, queries, answers);
             }
@@ -153,15 +160,15 @@ impl Places {
         }
     }
 
-    /// The answers by comparisons alone, and a bit for each that they leave open.
+    /// The answers by comparisons with squares or with texels, and a bit for each that they leave open.
     #[inline(always)]
-    fn compare(&mut self, view: &View<'_>, answers: &mut [Answer]) -> u32 {
+    fn compare(&mut self, view: &View<'_>, squares: bool, answers: &mut [Answer]) -> u32 {
         let n = lanes(answers.len());
         let (loaded, _) = self.depths[..n].as_chunks_mut::<LANES>();
         let (texels, _) = self.texel[..n].as_chunks::<LANES>();
         for (depths, texels) in loaded.iter_mut().zip(texels) {
             for i in 0..LANES {
-                depths[i] = view.texel(texels[i]).depths;
+                depths[i] = if squares { view.square(texels[i]) } else { view.texel(texels[i]).depths };
             }
         }
         let (mut found, mut is_open) = ([Answer::Unknown; BLOCK], [false; BLOCK]);
@@ -176,6 +183,20 @@ impl Places {
         // Lanes beyond the last query hold anything.
         let asked = u32::MAX >> (BLOCK - count);
         (0..BLOCK).fold(0, |open, i| open | u32::from(is_open[i]) << i) & asked
+    }
+
+    /// The same by comparisons with texels, of those that squares left `open`.
+    #[inline(always)]
+    fn compare_texels(&self, view: &View<'_>, mut open: u32, answers: &mut [Answer]) -> u32 {
+        let mut still = 0;
+        while open != 0 {
+            let i = open.trailing_zeros();
+            open &= open - 1;
+            let (lit, is_open) = compare(self.code[i as usize], view.texel(self.texel[i as usize]).depths);
+            answers[i as usize] = Answer::of(!(lit | is_open));
+            still |= u32::from(is_open) << i;
+        }
+        still
     }
 
     #[inline(always)]

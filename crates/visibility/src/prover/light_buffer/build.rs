@@ -515,12 +515,13 @@ fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins,
     }
     let record_of = occurs;
     // Texels of no face, those of the tiles, all that are divided.
-    let mut part = place::FIRST as usize + tiles.len() * TILE_TEXELS;
+    let texels_of_faces = place::FIRST as usize + tiles.len() * TILE_TEXELS;
+    let mut part = texels_of_faces;
     let all_parts = tiles.iter().map(|tile| tile.parts.len()).sum::<usize>();
     let mut entry = 1;
     // One more at the end: who reads an entry may read the next.
     let all_entries = 1 + entry + tiles.iter().map(|tile| tile.entries.len()).sum::<usize>();
-    let mut tables = Tables::zeroed(part + all_parts, all_entries, numbers.len());
+    let mut tables = Tables::zeroed(texels_of_faces, part + all_parts, all_entries, numbers.len());
     let mut view = tables.view_mut();
     view.records().par_iter_mut().zip(&numbers).for_each(|(record, &number)| {
         // Those that have no cone do not occur.
@@ -545,5 +546,6 @@ fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins,
         part += tile.parts.len();
         entry += tile.entries.len();
     }
+    tables.fill_squares();
     LightBuffer { cube, tables }
 }

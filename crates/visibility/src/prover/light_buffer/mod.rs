@@ -114,6 +114,12 @@ impl Texel {
     const fn pair(self) -> [u32; 2] {
         [self.depths, self.tag.0]
     }
+
+    /// Before which code all is lit, and from which on all is occluded.
+    const fn depths(self) -> [u16; 2] {
+        let lit = self.depths & 0xffff;
+        [lit as u16, (lit + (self.depths >> 16)) as u16]
+    }
 }
 
 /// Whether comparisons of a query's code with a texel's depths find it lit, and whether they leave it open.
@@ -241,12 +247,31 @@ impl LightBuffer {
         self.look_up(from).answer
     }
 
+    /// The same answer, found sooner for points in space: of most of them it is enough to look at squares of texels.
+    #[inline]
+    #[must_use]
+    pub fn answer_in_space(&self, from: DVec3) -> Answer {
+        let d = from - self.cube.light();
+        let Some(place) = self.cube.place_of_one(d.as_vec3a()) else { return self.look_up_beside(d).answer };
+        let (lit, open) = compare(place.code, self.tables.view().square(place.texel));
+        if open {
+            return self.look_up_at(d, place).answer;
+        }
+        Answer::of(!lit)
+    }
+
     /// The same, and how it was found.
     #[inline]
     #[must_use]
     pub fn look_up(&self, from: DVec3) -> LookUp {
         let d = from - self.cube.light();
         let Some(place) = self.cube.place_of_one(d.as_vec3a()) else { return self.look_up_beside(d) };
+        self.look_up_at(d, place)
+    }
+
+    /// The answer for a difference `d` of point and light, which has this place.
+    #[inline(always)]
+    fn look_up_at(&self, d: DVec3, place: Place) -> LookUp {
         let view = self.tables.view();
         let texel = view.texel(place.texel);
         let (lit, open) = compare(place.code, texel.depths);

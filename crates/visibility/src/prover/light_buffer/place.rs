@@ -12,14 +12,15 @@ use super::frame::{DepthCode, TILE, Window};
 /// The texel of all directions behind which there is no geometry.
 pub(super) const NOTHING: u32 = 0;
 
-/// The texel of the light itself, of what is too near or too far for single precision, and of what is no number.
-pub(super) const UNKNOWN: u32 = 1;
+/// The texel of the light itself, of what is too near or too far for single precision, and of what is no number; in a square of its own.
+pub(super) const UNKNOWN: u32 = SQUARE * SQUARE;
 
 /// Where texels of faces start: on a square.
-pub(super) const FIRST: u32 = SQUARE * SQUARE;
+pub(super) const FIRST: u32 = 2 * SQUARE * SQUARE;
 
 /// Texels along the side of a square, which lie together.
-pub(super) const SQUARE: u32 = 8;
+pub(super) const SQUARE: u32 = 1 << LOG_SQUARE;
+const LOG_SQUARE: u32 = 2;
 
 /// The least and the largest distance of a query that has a texel.
 const REACH: [f32; 2] = [1.0 / (1_u128 << 100) as f32, (1_u128 << 100) as f32];
@@ -212,11 +213,18 @@ const BY_BITS: [usize; 8] = [0, 2, 4, 4, 1, 3, 5, 5];
 const MANTISSA: u32 = 23;
 const ONE: u32 = 127;
 
-/// The number of a texel in its window: squares of 8 × 8, row by row.
+/// The square of a texel.
+#[inline(always)]
+pub(super) const fn square(texel: u32) -> u32 {
+    texel >> (2 * LOG_SQUARE)
+}
+
+/// The number of a texel in its window: squares of 4 × 4, row by row.
 #[inline(always)]
 pub(super) const fn in_window(i: u32, j: u32, log_side: u32) -> u32 {
     const IN_SQUARE: u32 = SQUARE - 1;
-    ((j & !IN_SQUARE) << log_side) + ((i & !IN_SQUARE) << 3) + ((j & IN_SQUARE) << 3) + (i & IN_SQUARE)
+    let (row, column) = ((j & !IN_SQUARE) << log_side, (i & !IN_SQUARE) << LOG_SQUARE);
+    row + column + ((j & IN_SQUARE) << LOG_SQUARE) + (i & IN_SQUARE)
 }
 
 /// The number of a texel in its tile, as if that were a window.

@@ -160,6 +160,7 @@ fn answers_are_those_of_a_loop() {
             for kind in 0..ASKED {
                 let from = hard_point(&mut random, &triangles, light, kind);
                 let LookUp { answer, tests: n } = buffer.look_up(from);
+                assert_eq!(buffer.answer_in_space(from), answer, "{name}, {side}: {from:?} by squares");
                 let truth = occluded(&triangles, from, light);
                 assert!(
                     answer == Answer::Unknown || (answer == Answer::Occluded) == truth,
