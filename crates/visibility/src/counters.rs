@@ -4,6 +4,8 @@ use crate::{Answer, QueryKind, ShadowQuery};
 
 /// Counts of one thread or of a whole render.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+// In this order, so that vectors are added to it.
+#[repr(C)]
 pub struct Counters {
     /// Visibility queries, N.
     pub queries: u64,
@@ -35,19 +37,42 @@ pub struct Counters {
 
 /// What one query adds to `spatial`, `proved`, `on_light`, `on_light_proved`, `superficial_proved` and `proved_occluded`.
 #[inline(always)]
-fn shares(kind: QueryKind, answer: Answer) -> [u8; 6] {
-    let known = answer != Answer::Unknown;
-    let of = |is: QueryKind| [u8::from(kind == is), u8::from((kind == is) & known)];
-    let ([spatial, proved], [on_light, on_light_proved]) = (of(QueryKind::Spatial), of(QueryKind::OnLight));
-    let [_, superficial_proved] = of(QueryKind::Superficial);
-    [spatial, proved, on_light, on_light_proved, superficial_proved, u8::from(answer == Answer::Occluded)]
+const fn shares(kind: QueryKind, answer: Answer) -> [u8; 6] {
+    let known = !matches!(answer, Answer::Unknown);
+    let spatial = matches!(kind, QueryKind::Spatial);
+    let on_light = matches!(kind, QueryKind::OnLight);
+    let superficial = matches!(kind, QueryKind::Superficial);
+    let occluded = matches!(answer, Answer::Occluded);
+    [
+        spatial as u8,
+        (spatial & known) as u8,
+        on_light as u8,
+        (on_light & known) as u8,
+        (superficial & known) as u8,
+        occluded as u8,
+    ]
 }
+
+/// The same for one query, of each kind and with each answer, and 1 for `queries` before it.
+const SHARES: [[[u64; 7]; 3]; 3] = {
+    let mut all = [[[0; 7]; 3]; 3];
+    let kinds = [QueryKind::Spatial, QueryKind::OnLight, QueryKind::Superficial];
+    let answers = [Answer::Unoccluded, Answer::Occluded, Answer::Unknown];
+    let mut i = 0;
+    while i < 9 {
+        let (kind, answer) = (kinds[i / 3], answers[i % 3]);
+        let [a, b, c, d, e, f] = shares(kind, answer);
+        all[kind as usize][answer as usize] = [1, a as u64, b as u64, c as u64, d as u64, e as u64, f as u64];
+        i += 1;
+    }
+    all
+};
 
 impl Counters {
     /// Counts a query with this answer of the provers.
     #[inline(always)]
     pub(crate) fn count(&mut self, kind: QueryKind, answer: Answer) {
-        self.add(1, shares(kind, answer));
+        self.add(SHARES[kind as usize][answer as usize]);
     }
 
     /// Counts many.
@@ -65,14 +90,15 @@ impl Counters {
                     *sum += share;
                 }
             }
-            self.add(queries.len(), sums);
+            let [a, b, c, d, e, f] = sums.map(u64::from);
+            self.add([queries.len() as u64, a, b, c, d, e, f]);
         }
     }
 
     #[inline(always)]
-    fn add(&mut self, queries: usize, shares: [u8; 6]) {
-        let [spatial, proved, on_light, on_light_proved, superficial_proved, proved_occluded] = shares.map(u64::from);
-        self.queries += queries as u64;
+    fn add(&mut self, shares: [u64; 7]) {
+        let [queries, spatial, proved, on_light, on_light_proved, superficial_proved, proved_occluded] = shares;
+        self.queries += queries;
         self.spatial += spatial;
         self.proved += proved;
         self.on_light += on_light;

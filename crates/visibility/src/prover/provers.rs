@@ -73,8 +73,18 @@ impl Provers {
         if let Some(LightProver::Buffer(buffer)) = self.lights.get(query.emitter)
             && query.to == buffer.position()
         {
-            return buffer.answer(query.from);
+            // The same answer either way.
+            return match query.kind {
+                QueryKind::Spatial => buffer.answer_in_space(query.from),
+                _ => buffer.answer(query.from),
+            };
         }
+        self.answer_by_field(query)
+    }
+
+    /// The same where there is no light buffer.
+    #[inline(never)]
+    fn answer_by_field(&self, query: &ShadowQuery) -> Answer {
         match query.kind {
             QueryKind::Spatial => self.answer_spatial(query.emitter, query.from, query.to),
             QueryKind::OnLight => self.answer_on_light(query.emitter, query.from, query.to),

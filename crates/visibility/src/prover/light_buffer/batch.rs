@@ -14,7 +14,7 @@ use super::{
     place::{Cube, Direction},
     tables::View,
 };
-use crate::ShadowQuery;
+use crate::{QueryKind, ShadowQuery};
 
 /// So many queries go through the stages together: a bit each.
 const BLOCK: usize = 32;
@@ -65,12 +65,19 @@ impl Run<'_> {
         let (cube, view) = (&self.buffer.cube, self.buffer.tables.view());
         let mut places = Places::new();
         let mut done = 0;
+        // Whether squares decide most: a guess from what was asked last, on which no answer depends.
+        let mut squares = self.queries.first().is_some_and(|q| q.kind == QueryKind::Spatial);
         for (queries, answers) in self.queries.chunks(BLOCK).zip(self.answers.chunks_mut(BLOCK)) {
             if !are_towards(queries, self.emitter, cube.light()) {
                 break;
             }
             places.find::<WHOLE>(cube, queries);
-            let open = places.compare(&view, answers);
+            let mut open = places.compare(&view, squares, answers);
+            let left_open = open.count_ones();
+            if squares && open != 0 {
+                open = places.compare_texels(&view, open, answers);
+            }
+            squares = left_open < BLOCK as u32 / 4;
             if open != 0 {
                 self.buffer.test_open(&view, &places, open, queries, answers);
             }
@@ -113,17 +120,21 @@ fn add_differences(differs: &mut [u64; 4], query: &ShadowQuery, [x, y, z]: [u64;
 }
 
 /// The places of a block of queries, field by field as in [`Place`].
+// Each array in cache lines of its own: a number that is read from a vector that was written across two lines waits for the cache.
+#[repr(align(64))]
 struct Places {
     x: [[f32; BLOCK]; 3],
-    w: [f32; BLOCK],
+    reach: [f32; BLOCK],
     texel: [u32; BLOCK],
     code: [u32; BLOCK],
+    /// Of each texel.
+    depths: [u32; BLOCK],
 }
 
 impl Places {
     const fn new() -> Self {
         let zero = [0.0; BLOCK];
-        Self { x: [zero; 3], w: zero, texel: [0; BLOCK], code: [0; BLOCK] }
+        Self { x: [zero; 3], reach: zero, texel: [0; BLOCK], code: [0; BLOCK], depths: [0; BLOCK] }
     }
 
     /// The places of these queries.
@@ -135,35 +146,34 @@ impl Places {
         let (dx, dy, dz) = (&mut x[..n], &mut y[..n], &mut z[..n]);
         // By themselves, for a loop that holds numbers of double precision is made of vectors of half as many lanes.
         for i in 0..n {
-            [dx[i], dy[i], dz[i]] = cube.difference(queries[i].from);
+            [dx[i], dy[i], dz[i]] = (queries[i].from - cube.light()).as_vec3().to_array();
         }
         let n = lanes(n);
-        let (x, y, z, w) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut self.w[..n]);
+        let (x, y, z, reach) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut self.reach[..n]);
         let (texel, code) = (&mut self.texel[..n], &mut self.code[..n]);
         for i in 0..n {
-            let place = cube.place_of::<WHOLE, true>([x[i], y[i], z[i]]);
+            let place = cube.place_of::<WHOLE>([x[i], y[i], z[i]]);
             [x[i], y[i], z[i]] = place.direction.x;
-            w[i] = place.direction.w;
+            reach[i] = place.direction.reach;
             texel[i] = place.texel;
             code[i] = place.code;
         }
     }
 
-    /// The answers by comparisons alone, and a bit for each that they leave open.
+    /// The answers by comparisons with squares or with texels, and a bit for each that they leave open.
     #[inline(always)]
-    fn compare(&self, view: &View<'_>, answers: &mut [Answer]) -> u32 {
+    fn compare(&mut self, view: &View<'_>, squares: bool, answers: &mut [Answer]) -> u32 {
         let n = lanes(answers.len());
-        let mut depths = [0; BLOCK];
-        let (loaded, _) = depths[..n].as_chunks_mut::<LANES>();
+        let (loaded, _) = self.depths[..n].as_chunks_mut::<LANES>();
         let (texels, _) = self.texel[..n].as_chunks::<LANES>();
         for (depths, texels) in loaded.iter_mut().zip(texels) {
             for i in 0..LANES {
-                depths[i] = view.texel(texels[i] as usize).depths;
+                depths[i] = if squares { view.square(texels[i]) } else { view.texel(texels[i]).depths };
             }
         }
         let (mut found, mut is_open) = ([Answer::Unknown; BLOCK], [false; BLOCK]);
         for i in 0..n {
-            let (lit, open) = compare(self.code[i], depths[i]);
+            let (lit, open) = compare(self.code[i], self.depths[i]);
             // Those that are left open are so until a triangle blocks their way.
             found[i] = Answer::of(!(lit | open));
             is_open[i] = open;
@@ -175,9 +185,23 @@ impl Places {
         (0..BLOCK).fold(0, |open, i| open | u32::from(is_open[i]) << i) & asked
     }
 
+    /// The same by comparisons with texels, of those that squares left `open`.
+    #[inline(always)]
+    fn compare_texels(&self, view: &View<'_>, mut open: u32, answers: &mut [Answer]) -> u32 {
+        let mut still = 0;
+        while open != 0 {
+            let i = open.trailing_zeros();
+            open &= open - 1;
+            let (lit, is_open) = compare(self.code[i as usize], view.texel(self.texel[i as usize]).depths);
+            answers[i as usize] = Answer::of(!(lit | is_open));
+            still |= u32::from(is_open) << i;
+        }
+        still
+    }
+
     #[inline(always)]
     fn direction(&self, i: usize) -> Direction {
-        Direction { x: [self.x[0][i], self.x[1][i], self.x[2][i]], w: self.w[i] }
+        Direction { x: [self.x[0][i], self.x[1][i], self.x[2][i]], reach: self.reach[i] }
     }
 }
 
@@ -192,39 +216,58 @@ impl LightBuffer {
         queries: &[ShadowQuery],
         answers: &mut [Answer],
     ) {
-        // Who waits, in the order of the queries: whose it is, where in its list, the record that is next.
-        let (mut lane, mut entry, mut record) = ([0_u32; BLOCK], [0_u32; BLOCK], [0_u32; BLOCK]);
+        let light = self.cube.light();
+        // Who has a list, in the order of the queries: whose it is, where it starts.
+        let (mut lane, mut entry) = ([0_u32; BLOCK], [0_u32; BLOCK]);
         let mut waiting = 0;
         while open != 0 {
-            let i = open.trailing_zeros();
+            let i = open.trailing_zeros() as usize;
             open &= open - 1;
-            let tag = view.texel(places.texel[i as usize] as usize).tag;
-            if tag.kind() > Tag::SINGLE {
-                answers[i as usize] = self.answer(queries[i as usize].from);
-                continue;
-            }
-            // A mask, not a branch, which would be taken at random: who waits for one triangle has the first entry as its list, which ends there.
-            let of_list = tag.kind().wrapping_sub(1);
+            let tag = view.texel(places.texel[i]).tag;
             let number = tag.number() as u32;
-            let at = waiting % BLOCK;
-            (lane[at], entry[at]) = (i, number & of_list);
-            record[at] = (view.entry((number & of_list) as usize).triangle & of_list) | (number & !of_list);
-            waiting += 1;
-        }
-        // One triangle for each of them, then the next for those that still wait.
-        while waiting > 0 {
-            let mut left = 0;
-            for at in 0..waiting.min(BLOCK) {
-                let (i, number) = (lane[at] as usize % BLOCK, entry[at] as usize);
-                let d = queries[i].from - self.cube.light();
-                let found: Answer = view.record(record[at]).test(d, &places.direction(i)).into();
-                answers[i] = if found == Answer::Unoccluded { answers[i] } else { found };
-                let next = view.entry(number + 1);
-                (lane[left], entry[left], record[left]) = (i as u32, number as u32 + 1, next.triangle);
-                let ends = (view.entry(number).last == 1) | (places.code[i] < u32::from(next.nearest));
-                left += usize::from(!(ends | (found == Answer::Occluded)));
+            match tag.kind() {
+                Tag::COVER => answers[i] = view.record(number).side(queries[i].from - light, places.reach[i]).into(),
+                Tag::SINGLE => {
+                    answers[i] = view.record(number).test(queries[i].from - light, &places.direction(i)).into();
+                }
+                Tag::LIST => {
+                    (lane[waiting % BLOCK], entry[waiting % BLOCK]) = (i as u32, number);
+                    waiting += 1;
+                }
+                _ => answers[i] = self.answer(queries[i].from),
             }
-            waiting = left;
         }
+        if waiting > 0 {
+            test_lists(view, places, (lane, entry, waiting), light, queries, answers);
+        }
+    }
+}
+
+/// Answers those who have a list: one triangle for each of them, then the next for those that still wait.
+#[inline(always)]
+fn test_lists(
+    view: &View<'_>,
+    places: &Places,
+    (mut lane, mut entry, mut waiting): ([u32; BLOCK], [u32; BLOCK], usize),
+    light: DVec3,
+    queries: &[ShadowQuery],
+    answers: &mut [Answer],
+) {
+    let mut record = [0_u32; BLOCK];
+    for at in 0..waiting.min(BLOCK) {
+        record[at] = view.entry(entry[at]).triangle;
+    }
+    while waiting > 0 {
+        let mut left = 0;
+        for at in 0..waiting.min(BLOCK) {
+            let (i, number) = (lane[at] as usize % BLOCK, entry[at]);
+            let found: Answer = view.record(record[at]).test(queries[i].from - light, &places.direction(i)).into();
+            answers[i] = if found == Answer::Unoccluded { answers[i] } else { found };
+            let next = view.entry(number + 1);
+            (lane[left], entry[left], record[left]) = (i as u32, number + 1, next.triangle);
+            let ends = (view.entry(number).last == 1) | (places.code[i] < u32::from(next.nearest));
+            left += usize::from(!(ends | (found == Answer::Occluded)));
+        }
+        waiting = left;
     }
 }

@@ -184,7 +184,7 @@ impl LightBuffer {
         if budget.exceeded() {
             return Err(Refusal::Memory);
         }
-        let buffer = merge(triangles, Cube::new(light, &windows, depths), &windows, &bins, tiles);
+        let buffer = merge(triangles, Cube::new(light, &windows, depths, extent.farthest), &windows, &bins, tiles);
         if buffer.bytes() as u64 > max_bytes { Err(Refusal::Memory) } else { Ok(buffer) }
     }
 }
@@ -378,7 +378,7 @@ impl TileBuilder<'_> {
 
     /// Fills a square of texels that one triangle covers, behind which nothing matters.
     fn fill(&mut self, x: u32, y: u32, size: u32, cone: u32) {
-        let (cone, tag) = (&self.cones[cone as usize], Tag::single(self.numbers[cone as usize]));
+        let (cone, tag) = (&self.cones[cone as usize], Tag::cover(self.numbers[cone as usize]));
         for (x, y) in (y..y + size).flat_map(|y| (x..x + size).map(move |x| (x, y))) {
             if let Some([near, far]) = cone.depths(&self.window.rect(f64::from(x), f64::from(y), 1.0)) {
                 self.out.texels[place::in_tile(x, y)] =
@@ -447,7 +447,9 @@ impl TileBuilder<'_> {
         let lower = |near| self.depths.lower(near);
         if let [only] = self.scratch[start..] {
             let number = self.numbers[only.cone as usize];
-            return Texel::new(lower(only.near), occluded, Tag::single(number));
+            let covers = self.cones[only.cone as usize].covers(&self.window.rect(x, y, size));
+            let tag = if covers { Tag::cover(number) } else { Tag::single(number) };
+            return Texel::new(lower(only.near), occluded, tag);
         }
         if count == 0 {
             return Texel::EMPTY;
@@ -513,12 +515,13 @@ fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins,
     }
     let record_of = occurs;
     // Texels of no face, those of the tiles, all that are divided.
-    let mut part = place::FIRST as usize + tiles.len() * TILE_TEXELS;
+    let texels_of_faces = place::FIRST as usize + tiles.len() * TILE_TEXELS;
+    let mut part = texels_of_faces;
     let all_parts = tiles.iter().map(|tile| tile.parts.len()).sum::<usize>();
     let mut entry = 1;
     // One more at the end: who reads an entry may read the next.
     let all_entries = 1 + entry + tiles.iter().map(|tile| tile.entries.len()).sum::<usize>();
-    let mut tables = Tables::zeroed(part + all_parts, all_entries, numbers.len());
+    let mut tables = Tables::zeroed(texels_of_faces, part + all_parts, all_entries, numbers.len());
     let mut view = tables.view_mut();
     view.records().par_iter_mut().zip(&numbers).for_each(|(record, &number)| {
         // Those that have no cone do not occur.
@@ -543,5 +546,6 @@ fn merge(triangles: &[Triangle], cube: Cube, windows: &[Window; 6], bins: &Bins,
         part += tile.parts.len();
         entry += tile.entries.len();
     }
+    tables.fill_squares();
     LightBuffer { cube, tables }
 }

@@ -9,6 +9,12 @@
 //! with m that component before, it errs by 8u|A||B−A|/m + 2u, and its product with (u, v, 1) by less than three times that and 8u. For n,
 //! let κ = |B−A||C−A|/det. The numerator errs by 8u|B−A||C−A|, the determinant by 16u|B−A||C−A||A|, so that n, at most κ, errs by less than
 //! 16uκ(1 + κ|A|)·2. [`Cone::edge_errors`] and [`Cone::plane_error`] are eight times these bounds or more, in units of a component.
+//!
+//! On which side of the plane a point is, is known better than the plane's depth. Let m be the numerator as computed, t = m·A as computed, n as computed
+//! m/t, and d a point; |·|₁ the sum of components. With N the exact numerator, N·(d−A) has the sign of the side. t errs by less than
+//! 4u|m|·|A| componentwise, so by 4uκt|A|₁; m·(d−A) differs from N·(d−A) by at most 8uκt(|d|₁ + |A|₁); the quotients, the point's difference with the
+//! light, and the product's own rounding add 6uκt|d|₁. So n·d − 1 has the right sign where it exceeds uκ(14|d|₁ + 12|A|₁), less than 42uκ times the sum of both
+//! largest components. [`Cone::side_error`] is 64uκ, which leaves room for its own rounding and that of the sum to single precision.
 
 use glam::{DVec2, DVec3, Vec3};
 use vdf_geometry::Triangle;
@@ -41,6 +47,9 @@ pub(super) struct Cone {
     pub(super) plane: DVec3,
     /// The largest error of a component of `plane`, and of one more rounding; infinite if `plane` is zero.
     pub(super) plane_error: f64,
+    /// The largest error of n·d − 1 as a judge of a point's side of the plane, over the sum of the largest component of d and that of a vertex; infinite if
+    /// `plane` is zero.
+    pub(super) side_error: f64,
 }
 
 impl Cone {
@@ -62,10 +71,10 @@ impl Cone {
             corners.swap(1, 2);
         }
         let kappa = sizes / det.abs();
-        let (plane, plane_error) = if kappa * nearest < 1.0 / VAGUE {
-            (normal / det, 4.0 * ROUNDING * kappa * (1.0 + kappa * nearest))
+        let (plane, plane_error, side_error) = if kappa * nearest < 1.0 / VAGUE {
+            (normal / det, 4.0 * ROUNDING * kappa * (1.0 + kappa * nearest), 2.0 * ROUNDING * kappa)
         } else {
-            (DVec3::ZERO, f64::INFINITY)
+            (DVec3::ZERO, f64::INFINITY, f64::INFINITY)
         };
         let world = corners.map(|v| v.as_dvec3());
         let vertices = world.map(|v| v - light);
@@ -81,7 +90,8 @@ impl Cone {
                 (edges[i], edge_errors[i]) = (cross / largest, error);
             }
         }
-        Some(Self { vertices, corners, flat: [DVec2::NAN; 3], edges, edge_errors, keys: [0; 3], plane, plane_error })
+        let (flat, keys) = ([DVec2::NAN; 3], [0; 3]);
+        Some(Self { vertices, corners, flat, edges, edge_errors, keys, plane, plane_error, side_error })
     }
 
     /// The same in the axes of a face.

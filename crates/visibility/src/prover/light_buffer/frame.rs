@@ -7,9 +7,11 @@
 //! what is built for a texel is built for its [`Rect`], which is that much larger on every side. With ε = 2⁻²⁴:
 //! - The difference of point and light is rounded to single precision: an error of ε, relative to each component, and 2⁻⁵³ before.
 //! - At the seams, where two components are equal within these, any of the two faces may be chosen, and `u` is at most 1 + 2ε.
-//! - The texel's column is x = d·t + c, where t = (1/w)·s, with s texels per unit. The errors of d, of w, of its reciprocal, of t and of their
-//!   product come to 5ε, relative to d·t: 5ε in units of `u`. The window's corner is *defined* by the rounded c and s. The sum is rounded by ε|x|,
-//!   which is at most 2ε in units of `u`, for a window is at most 2 wide.
+//! - The texel's column, and the n columns of the window more, is x = d·t + c, where t = (1/w)·s, with s texels per unit. The errors of d, of w, of its
+//!   reciprocal, of t and of their product come to 5ε, relative to d·t: 5ε in units of `u`. The window's corner is *defined* by the rounded c and s. In
+//!   the window x is from n to 2n, where the sum is rounded by εn, which is at most 2ε in units of `u`, for a window is at most 2 wide.
+//! - Of a whole face `s` is 16ε less than half of n, so that 1 + 2ε times t, with the errors of t and of the product, is less than half of n by more than the
+//!   rounding of the sum: the column of whatever belongs to the face is from 0 to n, n left out, without being clamped.
 //! - Rectangles, in double precision, err by less than 2⁻⁴⁸.
 //!
 //! That is 7ε and little more, less than half of `SLACK`, 16ε. What is looked up in a part of a texel errs by no more: the place in the texel and its
@@ -31,6 +33,9 @@ pub(super) const TILE: u32 = 64;
 /// By how much rectangles are enlarged, in units of `u` and `v`, to find the squares that they meet: twice the slack, which is far more than the
 /// rounding of a place.
 const MARGIN: f64 = 2.0 * SLACK;
+
+/// By how much a whole face's texels are wider than the face divided: 1 − 16ε, see above.
+const WITHIN: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
 /// A texel is at least so many times the slack wide.
 const NARROWEST: f64 = 32.0;
@@ -95,7 +100,7 @@ pub(super) struct Window {
     /// Sides of a texel.
     du: f64,
     dv: f64,
-    /// What maps `u` and `v` to columns and rows of texels: how many there are to the left of 0, and in a unit.
+    /// What maps `u` and `v` to columns and rows of texels: how many there are to the left of 0, and `side` more; how many there are in a unit.
     pub(super) origin: [f32; 2],
     pub(super) scale: [f32; 2],
     /// Texels along each side; 0 if there is no geometry behind this face.
@@ -109,11 +114,12 @@ impl Window {
     pub(super) const NONE: Self =
         Self { u0: 0.0, v0: 0.0, du: 0.0, dv: 0.0, origin: [-1.0; 2], scale: [0.0; 2], side: 0, first: 0 };
 
-    /// All of a face. Directions beside it, which the seams' rounding may put there, belong to its border.
+    /// All of a face, and so much more that directions which the seams' rounding puts beside it have texels.
     pub(super) const fn whole(side: u32, first: u32) -> Self {
         let half = side as f32 * 0.5;
-        let du = 1.0 / half as f64;
-        Self { u0: -1.0, v0: -1.0, du, dv: du, origin: [half; 2], scale: [half; 2], side, first }
+        let scale = half * WITHIN;
+        let (u0, du) = (-(half as f64) / scale as f64, 1.0 / scale as f64);
+        Self { u0, v0: u0, du, dv: du, origin: [side as f32 + half; 2], scale: [scale; 2], side, first }
     }
 
     /// The window that holds these bounds (least and greatest `u`, least and greatest `v`) with `side` texels along each side.
@@ -126,8 +132,8 @@ impl Window {
             let (a, b) = ((a - margin).max(-1.0 - 4.0 * SLACK), (b + margin).min(1.0 + 4.0 * SLACK));
             // Rounded down, so that the window becomes wider by less than the margin.
             let scale = ((n / (b - a)) as f32).next_down();
-            let origin = (-a * f64::from(scale)) as f32;
-            (origin, scale, -f64::from(origin) / f64::from(scale), f64::from(scale).recip())
+            let origin = (n - a * f64::from(scale)) as f32;
+            (origin, scale, (n - f64::from(origin)) / f64::from(scale), f64::from(scale).recip())
         };
         let ((origin_u, scale_u, u0, du), (origin_v, scale_v, v0, dv)) = (map(u0, u1), map(v0, v1));
         Self { u0, v0, du, dv, origin: [origin_u, origin_v], scale: [scale_u, scale_v], side, first }

@@ -89,7 +89,7 @@ pub struct LookUp {
 /// What is known of a pyramid of directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Texel {
-    /// Two codes of depths: a query with a lower code than the low half meets nothing, one with the high half or a higher one is occluded.
+    /// Two codes of depths: a query with a lower code than the low half meets nothing, one with the sum of both halves or a higher one is occluded.
     depths: u32,
     tag: Tag,
 }
@@ -100,8 +100,10 @@ impl Texel {
     /// Nothing is known.
     const UNKNOWN: Self = Self::new(0, NEVER, Tag::NOTHING);
 
+    /// Lit before one code, occluded from the other on, which is not the lower one.
     const fn new(lit: u16, occluded: u16, tag: Tag) -> Self {
-        Self { depths: (occluded as u32) << 16 | lit as u32, tag }
+        debug_assert!(lit <= occluded);
+        Self { depths: (occluded.saturating_sub(lit) as u32) << 16 | lit as u32, tag }
     }
 
     #[inline(always)]
@@ -112,28 +114,37 @@ impl Texel {
     const fn pair(self) -> [u32; 2] {
         [self.depths, self.tag.0]
     }
+
+    /// Before which code all is lit, and from which on all is occluded.
+    const fn depths(self) -> [u16; 2] {
+        let lit = self.depths & 0xffff;
+        [lit as u16, (lit + (self.depths >> 16)) as u16]
+    }
 }
 
 /// Whether comparisons of a query's code with a texel's depths find it lit, and whether they leave it open.
 #[inline(always)]
 const fn compare(code: u32, depths: u32) -> (bool, bool) {
-    let (lit, occluded) = (code < depths & 0xffff, code >= depths >> 16);
-    (lit, !(lit | occluded))
+    // One comparison for both: less than nothing is more than all.
+    let (lit, open) = (depths & 0xffff, depths >> 16);
+    (code < lit, code.wrapping_sub(lit) < open)
 }
 
-/// What decides the other queries: two bits of kind and a number.
+/// What decides the other queries: three bits of kind and a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Tag(u32);
 
 impl Tag {
     /// There must not be more triangles, entries or texels.
     const MOST: usize = Self::NUMBER as usize;
-    const NUMBER: u32 = (1 << 30) - 1;
+    const KIND: u32 = 29;
+    const NUMBER: u32 = (1 << Self::KIND) - 1;
     const LIST: u32 = 0;
     const SINGLE: u32 = 1;
-    const PARTS: u32 = 2;
+    const COVER: u32 = 2;
+    const PARTS: u32 = 3;
     /// Nobody knows.
-    const NOTHING: Self = Self(3 << 30);
+    const NOTHING: Self = Self(4 << Self::KIND);
 
     /// The list that starts at this entry.
     const fn list(first: usize) -> Self {
@@ -142,17 +153,22 @@ impl Tag {
 
     /// One triangle.
     const fn single(number: u32) -> Self {
-        Self((Self::SINGLE << 30) | number)
+        Self((Self::SINGLE << Self::KIND) | number)
+    }
+
+    /// One triangle that all directions of the texel meet, so that only its plane has to be asked.
+    const fn cover(number: u32) -> Self {
+        Self((Self::COVER << Self::KIND) | number)
     }
 
     /// The parts that start at this texel.
     const fn parts(first: usize) -> Self {
-        Self((Self::PARTS << 30) | first as u32)
+        Self((Self::PARTS << Self::KIND) | first as u32)
     }
 
     #[inline]
     const fn kind(self) -> u32 {
-        self.0 >> 30
+        self.0 >> Self::KIND
     }
 
     #[inline]
@@ -160,8 +176,9 @@ impl Tag {
         (self.0 & Self::NUMBER) as usize
     }
 
+    /// The triangle, if it is one alone.
     fn as_single(self) -> Option<u32> {
-        (self.kind() == Self::SINGLE).then_some(self.number() as u32)
+        matches!(self.kind(), Self::SINGLE | Self::COVER).then_some(self.number() as u32)
     }
 
     /// The same after the tile got its place among all.
@@ -169,6 +186,7 @@ impl Tag {
         match self.kind() {
             Self::LIST => Self::list(self.number() + entry),
             Self::SINGLE => Self::single(record_of[self.number()]),
+            Self::COVER => Self::cover(record_of[self.number()]),
             Self::PARTS => Self::parts(self.number() + part),
             _ => self,
         }
@@ -229,22 +247,66 @@ impl LightBuffer {
         self.look_up(from).answer
     }
 
+    /// The same answer, found sooner for points in space: of most of them it is enough to look at squares of texels.
+    #[inline]
+    #[must_use]
+    pub fn answer_in_space(&self, from: DVec3) -> Answer {
+        let d = from - self.cube.light();
+        let Some(place) = self.cube.place_of_one(d.as_vec3a()) else { return self.look_up_beside(d).answer };
+        let (lit, open) = compare(place.code, self.tables.view().square(place.texel));
+        if open {
+            return self.look_up_at(d, place).answer;
+        }
+        Answer::of(!lit)
+    }
+
     /// The same, and how it was found.
     #[inline]
     #[must_use]
     pub fn look_up(&self, from: DVec3) -> LookUp {
-        let place = self.cube.place(from);
-        let texel = self.tables.texel(place.texel);
+        let d = from - self.cube.light();
+        let Some(place) = self.cube.place_of_one(d.as_vec3a()) else { return self.look_up_beside(d) };
+        self.look_up_at(d, place)
+    }
+
+    /// The answer for a difference `d` of point and light, which has this place.
+    #[inline(always)]
+    fn look_up_at(&self, d: DVec3, place: Place) -> LookUp {
+        let view = self.tables.view();
+        let texel = view.texel(place.texel);
         let (lit, open) = compare(place.code, texel.depths);
-        if open {
-            return self.tables.view().test(&place, from - self.cube.light(), texel.tag);
+        if !open {
+            return LookUp { answer: Answer::of(!lit), tests: 0 };
         }
-        LookUp { answer: Answer::of(!lit), tests: 0 }
+        if texel.tag.kind() == Tag::COVER {
+            let side = view.record(texel.tag.number() as u32).side(d, place.direction.reach);
+            return LookUp { answer: side.into(), tests: 1 };
+        }
+        // A copy, so that the place is in memory only here.
+        self.look_up_more(d, &{ place }, texel.tag)
+    }
+
+    /// The answer where edges have to be asked, or parts of the texel.
+    #[inline(never)]
+    fn look_up_more(&self, d: DVec3, place: &Place, tag: Tag) -> LookUp {
+        let view = self.tables.view();
+        match tag.kind() {
+            Tag::PARTS => view.look_up_part(place, d, self.cube.in_texel(place), tag.number()),
+            _ => view.test(place, d, tag),
+        }
+    }
+
+    /// The answer where there is no texel of a face.
+    #[cold]
+    #[allow(clippy::cast_possible_truncation, reason = "as for others")]
+    fn look_up_beside(&self, d: DVec3) -> LookUp {
+        let texel = self.tables.view().texel(self.cube.beside(d.as_vec3().to_array()));
+        LookUp { answer: if texel == Texel::EMPTY { Answer::Unoccluded } else { Answer::Unknown }, tests: 0 }
     }
 }
 
 impl View<'_> {
-    /// The answer by the triangles that may decide, for a difference `d` of point and light.
+    /// The answer by the triangles that may decide in a texel without parts, for a difference `d` of point and light.
     #[inline]
     fn test(&self, place: &Place, d: DVec3, tag: Tag) -> LookUp {
         match tag.kind() {
@@ -252,7 +314,9 @@ impl View<'_> {
                 LookUp { answer: self.record(tag.number() as u32).test(d, &place.direction).into(), tests: 1 }
             }
             Tag::LIST => self.test_list(place.code, d, &place.direction, tag.number()),
-            Tag::PARTS => self.look_up_part(place, d, tag.number()),
+            Tag::COVER => {
+                LookUp { answer: self.record(tag.number() as u32).side(d, place.direction.reach).into(), tests: 1 }
+            }
             _ => LookUp { answer: Answer::Unknown, tests: 0 },
         }
     }
@@ -262,7 +326,7 @@ impl View<'_> {
     fn test_list(&self, code: u32, d: DVec3, direction: &Direction, first: usize) -> LookUp {
         let (mut tests, mut found) = (0, Verdict::Passes);
         for number in first.. {
-            let entry = self.entry(number);
+            let entry = self.entry(number as u32);
             if code < u32::from(entry.nearest) {
                 break;
             }
@@ -282,22 +346,25 @@ impl View<'_> {
         LookUp { answer: found.into(), tests }
     }
 
-    /// The answer in the part of a divided texel, whose parts start at `first`.
+    /// The answer in the part of a divided texel that this place in it, from 0 to 1, belongs to. Its parts start at `first`.
     #[cold]
-    fn look_up_part(&self, place: &Place, d: DVec3, first: usize) -> LookUp {
+    fn look_up_part(&self, place: &Place, d: DVec3, at: [f32; 2], first: usize) -> LookUp {
         let parts = PARTS as f32;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to what there is")]
         let part = |at: f32| {
             let part = ((at * parts) as u32).min(PARTS - 1);
-            (part as usize, at * parts - part as f32)
+            (part, at * parts - part as f32)
         };
-        let [(i, x), (j, y)] = place.at.map(part);
-        let texel = self.texel(first + j * PARTS as usize + i);
+        let [(i, x), (j, y)] = at.map(part);
+        let texel = self.texel(first as u32 + j * PARTS + i);
         let (lit, open) = compare(place.code, texel.depths);
-        if open {
-            return self.test(&Place { at: [x, y], ..*place }, d, texel.tag);
+        if !open {
+            return LookUp { answer: Answer::of(!lit), tests: 0 };
         }
-        LookUp { answer: Answer::of(!lit), tests: 0 }
+        if texel.tag.kind() == Tag::PARTS {
+            return self.look_up_part(place, d, [x, y], texel.tag.number());
+        }
+        self.test(place, d, texel.tag)
     }
 }
 

@@ -5,21 +5,22 @@
 //!
 //! *Rounding.* See `frame`. Sums and products are rounded one by one, with every instruction set, so that places do not depend on it.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A, Vec3Swizzles as _, Vec4};
 
 use super::frame::{DepthCode, TILE, Window};
 
 /// The texel of all directions behind which there is no geometry.
 pub(super) const NOTHING: u32 = 0;
 
-/// The texel of the light itself, of what is too near or too far for single precision, and of what is no number.
-pub(super) const UNKNOWN: u32 = 1;
+/// The texel of the light itself, of what is too near or too far for single precision, and of what is no number; in a square of its own.
+pub(super) const UNKNOWN: u32 = SQUARE * SQUARE;
 
 /// Where texels of faces start: on a square.
-pub(super) const FIRST: u32 = SQUARE * SQUARE;
+pub(super) const FIRST: u32 = 2 * SQUARE * SQUARE;
 
 /// Texels along the side of a square, which lie together.
-pub(super) const SQUARE: u32 = 8;
+pub(super) const SQUARE: u32 = 1 << LOG_SQUARE;
+const LOG_SQUARE: u32 = 2;
 
 /// The least and the largest distance of a query that has a texel.
 const REACH: [f32; 2] = [1.0 / (1_u128 << 100) as f32, (1_u128 << 100) as f32];
@@ -32,12 +33,19 @@ pub(super) struct Cube {
     origin: [[f32; 6]; 2],
     scale: [[f32; 6]; 2],
     first: [u32; 6],
+    /// The same for single queries, which number faces by 1 for the second axis, 2 or 3 for the third, and 4 for a negative component.
+    maps: [([[f32; 2]; 2], u32); 8],
     /// Texels along each side, a power of two, and its exponent.
     side: u32,
     log_side: u32,
+    /// What is left of a mantissa, and the exponent of `side` as single precision has it.
+    shift: u32,
+    exponent: u32,
     /// All windows are whole faces, one after the other.
     whole: bool,
     depths: DepthCode,
+    /// No component of the difference of a vertex and the light is larger.
+    farthest: f32,
 }
 
 /// What records are asked about: a point relative to the light.
@@ -45,23 +53,24 @@ pub(super) struct Cube {
 pub(super) struct Direction {
     /// The difference of both, divided by its largest component.
     pub(super) x: [f32; 3],
-    /// That component.
-    pub(super) w: f32,
+    /// That component, and the largest of any vertex.
+    pub(super) reach: f32,
 }
 
 /// A query's place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) direction: Direction,
-    /// Where in the texel, from 0 to 1, both ends included.
-    pub(super) at: [f32; 2],
+    /// Its column and row, and the texels along each side.
+    at: [f32; 2],
     pub(super) texel: u32,
     pub(super) code: u32,
 }
 
 impl Cube {
-    /// The cube around `light` with these windows, which have all the same sides, if any.
-    pub(super) fn new(light: DVec3, windows: &[Window; 6], depths: DepthCode) -> Self {
+    /// The cube around `light` with these windows, which have all the same sides, if any. No component of the difference of a vertex and the light is larger
+    /// than `farthest`.
+    pub(super) fn new(light: DVec3, windows: &[Window; 6], depths: DepthCode, farthest: f64) -> Self {
         let side = windows.iter().map(Window::side).max().unwrap_or(0).max(1);
         let faces = [0, 1, 2, 3, 4, 5];
         let whole = (0..).zip(windows).all(|(i, w)| *w == Window::whole(side, FIRST + i * side * side));
@@ -70,10 +79,15 @@ impl Cube {
             origin: [0, 1].map(|i| faces.map(|f| windows[f].origin[i])),
             scale: [0, 1].map(|i| faces.map(|f| windows[f].scale[i])),
             first: windows.map(|w| w.first),
+            maps: BY_BITS.map(|f| ([windows[f].origin, windows[f].scale], windows[f].first)),
             side,
             log_side: side.ilog2(),
+            shift: MANTISSA - side.ilog2(),
+            exponent: ONE + side.ilog2(),
             whole,
             depths,
+            #[allow(clippy::cast_possible_truncation, reason = "rounded up")]
+            farthest: (farthest as f32).next_up(),
         }
     }
 
@@ -91,24 +105,50 @@ impl Cube {
         self.whole
     }
 
-    /// The place of a query from this point.
+    /// The place of one query at this difference from the light: all components in one vector, without memory or a branch between them. `None` for what has no
+    /// texel of a face.
     #[inline(always)]
-    pub(super) fn place(&self, from: DVec3) -> Place {
-        let d = self.difference(from);
-        if self.whole { self.place_of::<true, false>(d) } else { self.place_of::<false, false>(d) }
+    pub(super) fn place_of_one(&self, d: Vec3A) -> Option<Place> {
+        let a = d.abs();
+        // The face is that of the largest component.
+        let [ax, ay, az] = [Vec3A::splat(a.x), Vec3A::splat(a.y), Vec3A::splat(a.z)];
+        let second = ay.cmpgt(ax);
+        let of_two = ay.max(ax);
+        let third = az.cmpgt(of_two);
+        let w = az.max(of_two);
+        let turned = Vec3A::select(third, d, Vec3A::select(second, d.zxy(), d.yzx()));
+        let face =
+            (second.bitmask() & 1) | (third.bitmask() & 2) | (Vec4::from((turned, 0.0)).is_negative_bitmask() & 4);
+        let inverse = Vec3A::ONE / w;
+        let ([[origin_u, origin_v], [scale_u, scale_v]], first) = self.maps[face as usize % 8];
+        let scale = inverse * Vec3A::new(scale_u, scale_v, 0.0);
+        let place = turned * scale + Vec3A::new(origin_u, origin_v, 0.0);
+        let at = [place.x, place.y];
+        // False for what is no number: that is the largest, or its column or row is none.
+        if !(Self::reaches(w.x) & self.holds(at[0]) & self.holds(at[1])) {
+            return None;
+        }
+        let [x, y, z] = (d * inverse).to_array();
+        let texel = first + in_window(self.whole(at[0]), self.whole(at[1]), self.log_side);
+        let direction = Direction { x: [x, y, z], reach: w.x + self.farthest };
+        Some(Place { direction, at, texel, code: self.depths.of(w.x) })
     }
 
-    /// The difference of a point and the light.
-    #[inline(always)]
-    #[allow(clippy::cast_possible_truncation, reason = "the slack of a texel covers the rounding")]
-    pub(super) fn difference(&self, from: DVec3) -> [f32; 3] {
-        [(from.x - self.light.x) as f32, (from.y - self.light.y) as f32, (from.z - self.light.z) as f32]
+    /// The texel of a single query that has none of a face.
+    #[cold]
+    pub(super) fn beside(&self, [x, y, z]: [f32; 3]) -> u32 {
+        self.place_of::<false>([x, y, z]).texel
     }
 
-    /// The place of a query at this difference from the light. `WHOLE` says that the windows are whole faces, `MANY` that this is one of many, whose
-    /// components are selected in vectors. One alone takes them from memory, for its selections would become branches, which are taken at random.
+    /// Whether single precision reaches so far, and so near.
     #[inline(always)]
-    pub(super) fn place_of<const WHOLE: bool, const MANY: bool>(&self, [x, y, z]: [f32; 3]) -> Place {
+    fn reaches(w: f32) -> bool {
+        (REACH[0]..=REACH[1]).contains(&w)
+    }
+
+    /// The place of one of many queries. `WHOLE` says that the windows are whole faces.
+    #[inline(always)]
+    pub(super) fn place_of<const WHOLE: bool>(&self, [x, y, z]: [f32; 3]) -> Place {
         // The face is that of the largest component.
         let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
         let second = ay > ax;
@@ -116,28 +156,20 @@ impl Cube {
         let third = az > of_two;
         let w = if third { az } else { of_two };
         let axis = 2 * u32::from(third) + u32::from(second & !third);
-        let (u, v, along) = if MANY {
-            let (u, v, along) = if second { (z, x, y) } else { (y, z, x) };
-            if third { (x, y, z) } else { (u, v, along) }
-        } else {
-            let (cycle, axis) = ([x, y, z, x, y], axis.min(2) as usize);
-            (cycle[axis + 1], cycle[axis + 2], cycle[axis])
-        };
+        let (u, v, along) = if second { (z, x, y) } else { (y, z, x) };
+        let (u, v, along) = if third { (x, y, z) } else { (u, v, along) };
         let face = 2 * axis + (along.to_bits() >> 31);
-        // False for what is no number.
-        let valid = (ax + ay + az <= REACH[1]) & (w >= REACH[0]);
+        // The sum is no number if one of them is none.
+        let valid = (ax + ay + az <= 4.0 * REACH[1]) & Self::reaches(w);
         let inverse = w.recip();
         let ([origin_u, origin_v], [scale_u, scale_v], first) = self.window::<WHOLE>(face);
         let (column, row) = (u * (inverse * scale_u) + origin_u, v * (inverse * scale_v) + origin_v);
-        let n = self.side as f32;
-        let inside = valid & (WHOLE | ((column >= 0.0) & (row >= 0.0) & (column < n) & (row < n)));
-        let last = self.side - 1;
-        let (i, j) = (whole(column).min(last), whole(row).min(last));
-        let texel = first + in_window(i, j, self.log_side);
+        let inside = valid & (WHOLE | (self.holds(column) & self.holds(row)));
+        let texel = first + in_window(self.whole(column), self.whole(row), self.log_side);
         let beside = if valid { NOTHING } else { UNKNOWN };
         Place {
-            direction: Direction { x: [x * inverse, y * inverse, z * inverse], w },
-            at: [column - i as f32, row - j as f32],
+            direction: Direction { x: [x * inverse, y * inverse, z * inverse], reach: w + self.farthest },
+            at: [column, row],
             texel: if inside { texel } else { beside },
             code: self.depths.of(w),
         }
@@ -146,38 +178,58 @@ impl Cube {
     /// The window of a face: its origin, its scale and its first texel.
     #[inline(always)]
     fn window<const WHOLE: bool>(&self, face: u32) -> ([f32; 2], [f32; 2], u32) {
+        let ([of_u, of_v], [per_u, per_v]) = (&self.origin, &self.scale);
         if WHOLE {
-            let half = self.side as f32 * 0.5;
-            return ([half; 2], [half; 2], FIRST + (face << (2 * self.log_side)));
+            return ([of_u[0], of_v[0]], [per_u[0], per_v[0]], FIRST + (face << (2 * self.log_side)));
         }
         // Not closures, which would not be made vectors of.
-        let (face, [of_u, of_v], [per_u, per_v]) = ((face as usize).min(5), &self.origin, &self.scale);
+        let face = (face as usize).min(5);
         ([of_u[face], of_v[face]], [per_u[face], per_v[face]], self.first[face])
+    }
+
+    /// Whether a column or row is one of the window: a number from n to 2n, and no other, has the exponent of n.
+    #[inline(always)]
+    const fn holds(&self, column: f32) -> bool {
+        column.to_bits() >> MANTISSA == self.exponent
+    }
+
+    /// The whole part of a column or row that the window holds, from 0: the first bits of its mantissa. Of any other number something less than n.
+    #[inline(always)]
+    const fn whole(&self, column: f32) -> u32 {
+        (column.to_bits() >> self.shift) & (self.side - 1)
+    }
+
+    /// Where in its texel a place is, from 0 to 1, 1 left out. Exact.
+    #[inline]
+    pub(super) fn in_texel(&self, place: &Place) -> [f32; 2] {
+        place.at.map(|column| column - self.side as f32 - self.whole(column) as f32)
     }
 }
 
-/// The number of a texel in its window: squares of 8 × 8, row by row.
+/// The faces as single queries number them.
+const BY_BITS: [usize; 8] = [0, 2, 4, 4, 1, 3, 5, 5];
+
+/// Bits of a mantissa in single precision, and the exponent of one.
+const MANTISSA: u32 = 23;
+const ONE: u32 = 127;
+
+/// The square of a texel.
+#[inline(always)]
+pub(super) const fn square(texel: u32) -> u32 {
+    texel >> (2 * LOG_SQUARE)
+}
+
+/// The number of a texel in its window: squares of 4 × 4, row by row.
 #[inline(always)]
 pub(super) const fn in_window(i: u32, j: u32, log_side: u32) -> u32 {
     const IN_SQUARE: u32 = SQUARE - 1;
-    ((j & !IN_SQUARE) << log_side) + ((i & !IN_SQUARE) << 3) + ((j & IN_SQUARE) << 3) + (i & IN_SQUARE)
+    let (row, column) = ((j & !IN_SQUARE) << log_side, (i & !IN_SQUARE) << LOG_SQUARE);
+    row + column + ((j & IN_SQUARE) << LOG_SQUARE) + (i & IN_SQUARE)
 }
 
 /// The number of a texel in its tile, as if that were a window.
 pub(super) const fn in_tile(i: u32, j: u32) -> usize {
     in_window(i % TILE, j % TILE, TILE.ilog2()) as usize
-}
-
-/// The integer below `x`, which is less than 2²²; of an integer itself or the one below; 0 of what is negative. Half the instructions of a
-/// conversion.
-#[inline(always)]
-fn whole(x: f32) -> u32 {
-    // From 2²³ to 2²⁴ the last place is 1, so that a sum is rounded to the nearest integer; half of one less, for that is to be the one below.
-    const SHIFT: f32 = (1_u32 << 23) as f32 - 0.5;
-    const ZERO: i32 = ((1_u32 << 23) as f32).to_bits() as i32;
-    #[allow(clippy::cast_sign_loss, clippy::cast_possible_wrap, reason = "not negative")]
-    let whole = ((x + SHIFT).to_bits() as i32).max(ZERO) - ZERO;
-    whole as u32
 }
 
 #[cfg(test)]
@@ -196,7 +248,13 @@ mod tests {
             if whole { Window::whole(side, first) } else { of_face }
         });
         let light = DVec3::new(0.3, -17.0, 1e-3);
-        (Cube::new(light, &windows, DepthCode::new(1e-3, 1e3)), windows)
+        (Cube::new(light, &windows, DepthCode::new(1e-3, 1e3), 0.0), windows)
+    }
+
+    /// As one of many.
+    fn place_of_many(cube: &Cube, d: DVec3) -> Place {
+        let d = d.as_vec3().to_array();
+        if cube.whole { cube.place_of::<true>(d) } else { cube.place_of::<false>(d) }
     }
 
     /// The columns and rows of texels, by their numbers.
@@ -244,8 +302,10 @@ mod tests {
             let d = face.world(DVec3::new(u, v, 1.0)) * w;
             let from = cube.light() + d;
             let d = from - cube.light();
-            let place = cube.place(from);
-            if place.texel == NOTHING {
+            let many = place_of_many(cube, d);
+            let Some(place) = cube.place_of_one(d.as_vec3a()) else {
+                assert_eq!(many.texel, NOTHING);
+                assert_eq!(cube.beside(d.as_vec3().to_array()), NOTHING);
                 // Whatever face it was, it is beside the window by more than the slack of what is built for it.
                 let near = |t: f64, middle: f64, half: f64| (t - middle).abs() < half - 24.0 * SLACK;
                 assert!(
@@ -253,7 +313,9 @@ mod tests {
                 );
                 beside += 1;
                 continue;
-            }
+            };
+            assert_eq!((place.texel, place.code), (many.texel, many.code));
+            assert_eq!((place.direction.x, place.direction.reach), (many.direction.x, many.direction.reach));
             let number = place.texel - FIRST;
             let face = Face::ALL[(number / (window.side() * window.side())) as usize];
             let (i, j) = of[(number % (window.side() * window.side())) as usize];
@@ -262,12 +324,13 @@ mod tests {
             let (u, v) = (local.x / local.z, local.y / local.z);
             assert!((u - rect.u).abs() <= rect.half_u - SLACK / 2.0, "{u} {rect:?} {place:?}");
             assert!((v - rect.v).abs() <= rect.half_v - SLACK / 2.0, "{v} {rect:?} {place:?}");
-            assert!((f64::from(place.direction.w) / local.z - 1.0).abs() < 1e-7);
+            assert!((f64::from(place.direction.reach) / local.z - 1.0).abs() < 1e-7);
             let far = DVec3::from_array(place.direction.x.map(f64::from)) - d / local.z;
             assert!(far.abs().max_element() < 4.0 / 16_777_216.0);
-            for (at, half) in place.at.iter().zip([rect.half_u, rect.half_v]) {
-                let beyond = 2.0 * SLACK / half;
-                assert!((-beyond..=1.0 + beyond).contains(&f64::from(*at)), "{place:?}");
+            for (at, t, middle, half) in [(0, u, rect.u, rect.half_u), (1, v, rect.v, rect.half_v)] {
+                let at = f64::from(cube.in_texel(&place)[at]);
+                let exact = 0.5 + 0.5 * (t - middle) / (half - SLACK);
+                assert!((0.0..1.0).contains(&at) && (at - exact).abs() < 0.5 * SLACK / half, "{at} {exact} {place:?}");
             }
             found += 1;
         }
@@ -277,32 +340,25 @@ mod tests {
     #[test]
     fn what_is_too_near_or_too_far_or_no_number_has_a_texel_of_its_own() {
         for (cube, _) in [cube(Window::whole(64, 0), true), cube(Window::new([-1.0, 1.0, -0.5, 0.5], 64, 0), false)] {
+            let check = |d: DVec3| {
+                assert!(cube.place_of_one(d.as_vec3a()).is_none(), "{d}");
+                assert_eq!(cube.beside(d.as_vec3().to_array()), UNKNOWN, "{d}");
+                assert_eq!(place_of_many(&cube, d).texel, UNKNOWN, "{d}");
+            };
             let far = [1e31, 1e39, 1e300, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
             for axis in 0..3 {
                 for far in far {
                     for at in [DVec3::ZERO, DVec3::ONE, DVec3::new(5.0, -4.0, 3.0)] {
                         let mut from = at;
                         from[axis] = far;
-                        assert_eq!(cube.place(from).texel, UNKNOWN, "{from}");
+                        check(from - cube.light());
                     }
                 }
             }
-            assert_eq!(cube.place(cube.light()).texel, UNKNOWN);
-            assert_eq!(cube.place_of::<true, false>([1e-31, 0.0, 0.0]).texel, UNKNOWN);
-            assert!(cube.place_of::<true, false>([-1e-29, 1e-30, 0.0]).texel >= FIRST);
-        }
-    }
-
-    #[test]
-    fn whole_is_the_integer_below_or_of_an_integer_the_one_below_that() {
-        for n in [0, 1, 2, 7, 1000, 4_194_302_u32] {
-            let x = n as f32;
-            assert!([n, n.saturating_sub(1)].contains(&whole(x)));
-            assert_eq!(whole(x + 0.25), n);
-            assert_eq!(whole((n + 1) as f32 - 0.25), n);
-        }
-        for x in [-0.0, -1e-30, -0.5, -1e30, f32::NEG_INFINITY, 1e-30, 0.999] {
-            assert_eq!(whole(x), 0, "{x}");
+            check(DVec3::ZERO);
+            check(DVec3::X * 1e-31);
+            assert!(cube.place_of_one(Vec3A::new(-1e-29, 1e-30, 0.0)).is_some());
+            assert!(cube.place_of::<true>([-1e-29, 1e-30, 0.0]).texel >= FIRST);
         }
     }
 }

@@ -23,10 +23,10 @@ pub(super) enum Verdict {
 /// sum errs by 5ε more: by less than [`EDGE_ERROR`] = 32ε. Superficial queries start 2⁻³² of their coordinates off their own surface; so the plane is in
 /// double precision, and so is the point that is put into it.
 ///
-/// Numbers: the x of the three edges' normals, their y, their z; then the largest error of a product of the plane and a point, over the point's largest
-/// component; then the plane's three numbers, as their bits.
+/// Numbers: the x of the three edges' normals, their y, their z; then the largest error of a product of the plane and a point, over the sum of the point's
+/// largest component and that of any vertex (`Cone::side_error`); then the plane's three numbers, as their bits.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Record<'a>(pub(super) &'a Numbers);
+pub(super) struct Record<'a>(pub(super) &'a [u8; size_of::<Numbers>()]);
 
 /// The numbers of a record.
 pub(super) type Numbers = [f32; 16];
@@ -37,9 +37,6 @@ const PLANE: usize = 40;
 /// See [`Record`].
 const EDGE_ERROR: f32 = 32.0 / 16_777_216.0;
 
-/// The error of the last difference, from one.
-const ONE_ERROR: f64 = 4.0 * f64::EPSILON;
-
 impl Record<'_> {
     /// Those of a cone in the axes of the world.
     pub(super) fn numbers(cone: &Cone) -> Numbers {
@@ -48,30 +45,41 @@ impl Record<'_> {
             if cone.edge_errors[i] < 1.0 / 16_777_216.0 { cone.edges[i].as_vec3() } else { Vec3::ZERO }
         };
         let [a, b, c] = [edge(0), edge(1), edge(2)];
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "rounded up, as is the single precision of what it is multiplied with"
-        )]
-        let plane_error = ((4.5 * cone.plane_error) as f32).next_up();
+        #[allow(clippy::cast_possible_truncation, reason = "it leaves room for single precision")]
+        let plane_error = cone.side_error as f32;
         let mut all = [a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z, plane_error, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         bytemuck::bytes_of_mut(&mut all)[PLANE..].copy_from_slice(bytemuck::bytes_of(&cone.plane.to_array()));
         all
     }
 
+    /// By how much the light + `d` is behind the plane, and the error of that.
+    #[inline(always)]
+    fn behind(self, d: DVec3, reach: f32) -> (f64, f64) {
+        let [px, py, pz]: [f64; 3] = bytemuck::pod_read_unaligned(&self.0[PLANE..]);
+        let behind = px * d.x + py * d.y + pz * d.z - 1.0;
+        let plane_error: f32 = bytemuck::pod_read_unaligned(&self.0[PLANE - 4..PLANE]);
+        (behind, f64::from(plane_error * reach))
+    }
+
+    /// Whether the triangle meets the closed segment from the light to the light + `d`, whose direction is known to meet its cone.
+    #[inline(always)]
+    pub(super) fn side(self, d: DVec3, reach: f32) -> Verdict {
+        let (behind, error) = self.behind(d, reach);
+        let known = if behind > error { Verdict::Blocks } else { Verdict::Close };
+        if behind < -error { Verdict::Passes } else { known }
+    }
+
     /// Whether the triangle meets the closed segment from the light to the light + `d`, whose direction is also given in single precision.
     #[inline(always)]
-    pub(super) fn test(self, d: DVec3, &Direction { x: [x, y, z], w }: &Direction) -> Verdict {
+    pub(super) fn test(self, d: DVec3, &Direction { x: [x, y, z], reach }: &Direction) -> Verdict {
         // All three edges at once; the fourth lane says nothing.
-        let (ex, ey, ez) =
-            (Vec4::from_slice(&self.0[..4]), Vec4::from_slice(&self.0[3..7]), Vec4::from_slice(&self.0[6..10]));
-        let [a, b, c, _] = (ex * x + ey * y + ez * z).to_array();
-        let of_two = if b < a { b } else { a };
-        let least = if c < of_two { c } else { of_two };
-        let [px, py, pz]: [f64; 3] = bytemuck::pod_read_unaligned(&bytemuck::bytes_of(self.0)[PLANE..]);
-        let behind = px * d.x + py * d.y + pz * d.z - 1.0;
-        let error = f64::from(self.0[9]) * f64::from(w) + ONE_ERROR;
-        let passes = (least < -EDGE_ERROR) | (behind < -error);
-        let blocks = (least > EDGE_ERROR) & (behind > error);
+        let edges = |first: usize| Vec4::from_array(bytemuck::pod_read_unaligned(&self.0[4 * first..4 * first + 16]));
+        let at = edges(0) * x + edges(3) * y + edges(6) * z;
+        let beside = at.cmplt(Vec4::splat(-EDGE_ERROR)).bitmask() & 7 != 0;
+        let within = at.cmpgt(Vec4::splat(EDGE_ERROR)).bitmask() & 7 == 7;
+        let (behind, error) = self.behind(d, reach);
+        let passes = beside | (behind < -error);
+        let blocks = within & (behind > error);
         // Not branches, which would be taken at random.
         let known = if blocks { Verdict::Blocks } else { Verdict::Close };
         if passes { Verdict::Passes } else { known }
@@ -95,6 +103,7 @@ mod tests {
     fn verdicts_are_exact() {
         let mut random = fastrand::Rng::with_seed(2);
         let (mut blocks, mut passes, mut close, mut needless) = (0, 0, 0, 0);
+        let (mut sides, mut told) = (0, 0);
         for i in 0..200_000_usize {
             let size = 10.0_f64.powi(-((i % 6) as i32));
             let mut point = |size: f64| DVec3::from_array([(); 3].map(|()| size * (2.0 * random.f64() - 1.0)));
@@ -125,8 +134,18 @@ mod tests {
             let hit = intersect_exact(&Segment::new(from, light), &triangle).is_some();
             let single = d.as_vec3();
             let largest = single.abs().max_element();
-            let direction = Direction { x: (single * largest.recip()).to_array(), w: largest };
-            match Record(&record).test(d, &direction) {
+            let vertices = triangle.vertices_f64().map(|v| (v - light).abs().max_element() as f32);
+            let reach = largest + vertices.into_iter().fold(0.0, f32::max);
+            let direction = Direction { x: (single * largest.recip()).to_array(), reach };
+            let record = Record(bytemuck::cast_ref(&record));
+            // Where the direction certainly meets the cone, the side is all.
+            if (0..3).all(|i| cone.edges[i].dot(d) > cone.edge_errors[i] * w) {
+                let side = record.side(d, reach);
+                let known = side != Verdict::Close;
+                assert!(!known || (side == Verdict::Blocks) == hit, "{triangle:?} {light} {from} {side:?}");
+                (sides, told) = (sides + 1, told + usize::from(known));
+            }
+            match record.test(d, &direction) {
                 Verdict::Blocks => {
                     blocks += 1;
                     assert!(hit, "{triangle:?} {light} {from}");
@@ -146,5 +165,6 @@ mod tests {
             blocks > 9_000 && passes > 30_000 && close > 10_000 && needless < 100,
             "{blocks} {passes} {close} {needless}"
         );
+        assert!(sides > 30_000 && told * 2 > sides, "{sides} {told}");
     }
 }

@@ -1,12 +1,17 @@
-//! The memory of a light buffer: texels, lists and records one after the other, in huge pages where the system has them, as for fields.
+//! The memory of a light buffer: texels, lists, records and squares one after the other, in huge pages where the system has them, as for fields.
 //!
 //! A look-up touches each of the three at a place that has nothing to do with the last one's. With pages of 4 KiB most of these also wait for the
 //! translation of an address.
+//!
+//! A square stands for 4 × 4 texels: before its depth all of them are lit, beyond it all are occluded. A point in space is seldom between the two, and squares
+//! stay in the first caches, where texels of a large buffer do not.
 
 use vdf_distfield::Bytes;
 
 use super::{
-    Entry, Texel,
+    Entry, Tag, Texel,
+    frame::NEVER,
+    place,
     record::{Numbers, Record},
 };
 
@@ -20,15 +25,20 @@ pub(super) struct Tables {
     /// Where entries and records start, in bytes.
     entries: usize,
     records: usize,
+    squares: usize,
     end: usize,
 }
 
-/// The same, to look things up in.
+/// The same, to look things up in: bytes, which may start anywhere, so that nothing has to be asked but whether a number is within all.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
-    texels: &'a [Pair],
-    entries: &'a [Pair],
-    records: &'a [Numbers],
+    pairs: &'a [[u8; size_of::<Pair>()]],
+    lines: &'a [[u8; size_of::<Numbers>()]],
+    words: &'a [[u8; size_of::<u32>()]],
+    /// Texels, which are in front of the entries; pairs, lines and words in front of each of the others.
+    entries: usize,
+    records: usize,
+    squares: usize,
 }
 
 /// The same, to be filled.
@@ -39,13 +49,14 @@ pub(super) struct ViewMut<'a> {
 }
 
 impl Tables {
-    /// For so many of each, which are all zero.
-    pub(super) fn zeroed(texels: usize, entries: usize, records: usize) -> Self {
+    /// For so many of each, which are all zero. The first texels are those of faces, and of none, which have squares.
+    pub(super) fn zeroed(texels_of_faces: usize, texels: usize, entries: usize, records: usize) -> Self {
         let entries_at = texels * size_of::<Pair>();
         // Each record in a cache line of its own.
         let records_at = (entries_at + entries * size_of::<Pair>()).next_multiple_of(size_of::<Numbers>());
-        let end = records_at + records * size_of::<Numbers>();
-        Self { bytes: Bytes::zeroed(end), entries: entries_at, records: records_at, end }
+        let squares_at = records_at + records * size_of::<Numbers>();
+        let end = squares_at + texels_of_faces / (place::SQUARE * place::SQUARE) as usize * size_of::<u32>();
+        Self { bytes: Bytes::zeroed(end), entries: entries_at, records: records_at, squares: squares_at, end }
     }
 
     pub(super) const fn bytes(&self) -> usize {
@@ -53,23 +64,35 @@ impl Tables {
     }
 
     #[inline(always)]
-    pub(super) fn texel(&self, number: u32) -> Texel {
-        let texels: &[Pair] = bytemuck::cast_slice(&self.bytes[..self.entries]);
-        Texel::of(texels[number as usize])
+    pub(super) fn view(&self) -> View<'_> {
+        let ((pairs, _), (lines, _), (words, _)) =
+            (self.bytes.as_chunks(), self.bytes.as_chunks(), self.bytes.as_chunks());
+        View {
+            pairs,
+            lines,
+            words,
+            entries: self.entries / size_of::<Pair>(),
+            records: self.records / size_of::<Numbers>(),
+            squares: self.squares / size_of::<u32>(),
+        }
     }
 
-    #[inline(always)]
-    pub(super) fn view(&self) -> View<'_> {
-        View {
-            texels: bytemuck::cast_slice(&self.bytes[..self.entries]),
-            entries: bytemuck::cast_slice(&self.bytes[self.entries..self.records]),
-            records: bytemuck::cast_slice(&self.bytes[self.records..self.end]),
+    /// Fills the squares from the texels.
+    pub(super) fn fill_squares(&mut self) {
+        let (front, squares) = self.bytes[..self.end].split_at_mut(self.squares);
+        let squares: &mut [u32] = bytemuck::cast_slice_mut(squares);
+        let texels: &[Pair] = bytemuck::cast_slice(&front[..self.entries]);
+        for (square, texels) in squares.iter_mut().zip(texels.chunks((place::SQUARE * place::SQUARE) as usize)) {
+            let depths = texels.iter().map(|texel| Texel::of(*texel).depths());
+            let [lit, occluded] = depths.fold([NEVER, 0], |[l, o], [lit, occluded]| [l.min(lit), o.max(occluded)]);
+            *square = Texel::new(lit, occluded, Tag::NOTHING).depths;
         }
     }
 
     pub(super) fn view_mut(&mut self) -> ViewMut<'_> {
         let (texels, rest) = self.bytes[..self.end].split_at_mut(self.entries);
-        let (entries, records) = rest.split_at_mut(self.records - self.entries);
+        let (entries, rest) = rest.split_at_mut(self.records - self.entries);
+        let (records, _) = rest.split_at_mut(self.squares - self.records);
         ViewMut {
             texels: bytemuck::cast_slice_mut(texels),
             entries: bytemuck::cast_slice_mut(entries),
@@ -86,28 +109,35 @@ impl PartialEq for Tables {
 
 impl View<'_> {
     #[inline(always)]
-    pub(super) fn texel(&self, number: usize) -> Texel {
-        Texel::of(self.texels[number])
+    pub(super) fn texel(&self, number: u32) -> Texel {
+        Texel::of(bytemuck::cast(self.pairs[number as usize]))
+    }
+
+    /// The depths of the square of a texel of a face, or of none.
+    #[inline(always)]
+    pub(super) fn square(&self, texel: u32) -> u32 {
+        bytemuck::cast(self.words[self.squares + place::square(texel) as usize])
     }
 
     #[inline(always)]
-    pub(super) fn entry(&self, number: usize) -> Entry {
-        Entry::of(self.entries[number])
+    pub(super) fn entry(&self, number: u32) -> Entry {
+        Entry::of(bytemuck::cast(self.pairs[self.entries + number as usize]))
     }
 
     #[inline(always)]
     pub(super) fn record(&self, number: u32) -> Record<'_> {
-        Record(&self.records[number as usize])
+        Record(&self.lines[self.records + number as usize])
     }
 
     #[cfg(test)]
     pub(super) fn texels(&self) -> impl Iterator<Item = Texel> {
-        self.texels.iter().map(|pair| Texel::of(*pair))
+        self.pairs[..self.entries].iter().map(|pair| Texel::of(bytemuck::cast(*pair)))
     }
 
     #[cfg(test)]
     pub(super) fn entries(&self) -> impl Iterator<Item = Entry> {
-        self.entries.iter().map(|pair| Entry::of(*pair))
+        let end = self.records * size_of::<Numbers>() / size_of::<Pair>();
+        self.pairs[self.entries..end].iter().map(|pair| Entry::of(bytemuck::cast(*pair)))
     }
 }
 

@@ -160,6 +160,7 @@ fn answers_are_those_of_a_loop() {
             for kind in 0..ASKED {
                 let from = hard_point(&mut random, &triangles, light, kind);
                 let LookUp { answer, tests: n } = buffer.look_up(from);
+                assert_eq!(buffer.answer_in_space(from), answer, "{name}, {side}: {from:?} by squares");
                 let truth = occluded(&triangles, from, light);
                 assert!(
                     answer == Answer::Unknown || (answer == Answer::Occluded) == truth,
@@ -245,7 +246,7 @@ fn it_is_the_same_for_any_number_of_threads() {
     let one = build(1);
     assert_eq!(one, build(3));
     assert!(one.tables.view().entries().skip(1).any(|e| e.last == 1), "it has lists");
-    assert!(one.tables.view().texels().any(|t| t.tag.kind() == 2), "it has parts");
+    assert!(one.tables.view().texels().any(|t| t.tag.kind() == Tag::PARTS), "it has parts");
     // Where they are they are asked.
     for _ in 0..4000 {
         let from = DVec3::splat(0.5) + random_point(&mut random, 0.06);
@@ -264,6 +265,6 @@ fn memory_is_bounded_before_it_is_taken() {
     assert_eq!(build(10 << 20).err(), Some(Refusal::Memory));
     let buffer = build(1 << 30).expect("it fits");
     let view = buffer.tables.view();
-    let parts = view.texels().filter(|t| t.tag.kind() == 2).count();
+    let parts = view.texels().filter(|t| t.tag.kind() == Tag::PARTS).count();
     assert!(parts * 20 < view.texels().count(), "nearly all parts would have the same lists, not {parts} others");
 }
