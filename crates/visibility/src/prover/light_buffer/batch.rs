@@ -1,8 +1,8 @@
 //! Look-ups of many queries at once.
 //!
 //! *Idea.* A query waits for its texel, then for its list, then for a record; many wait no longer than one. So each stage is done for a block of them before
-//! the next begins. The first is arithmetic on arrays without a branch, which the compiler makes vectors of, as wide as the machine has them: all of
-//! it is compiled for several instruction sets, of which one is chosen once a run.
+//! the next begins. As long as squares decide most of a block they are asked before texels. The first stage is arithmetic on arrays without a branch, which
+//! the compiler makes vectors of, as wide as the machine has them: all of it is compiled for several instruction sets, of which one is chosen once a run.
 //!
 //! *Guarantee.* The same answers as [`LightBuffer::answer`], with every instruction set.
 

@@ -12,9 +12,10 @@
 //!
 //! On which side of the plane a point is, is known better than the plane's depth. Let m be the numerator as computed, t = m·A as computed, n as computed
 //! m/t, and d a point; |·|₁ the sum of components. With N the exact numerator, N·(d−A) has the sign of the side. t errs by less than
-//! 4u|m|·|A| componentwise, so by 4uκt|A|₁; m·(d−A) differs from N·(d−A) by at most 8uκt(|d|₁ + |A|₁); the quotients, the point's difference with the
-//! light, and the product's own rounding add 6uκt|d|₁. So n·d − 1 has the right sign where it exceeds uκ(14|d|₁ + 12|A|₁), less than 42uκ times the sum of both
-//! largest components. [`Cone::side_error`] is 64uκ, which leaves room for its own rounding and that of the sum to single precision.
+//! 4u times the sum of |mA| over components, so by 4uκt|A|₁; m·(d−A) differs from N·(d−A) by at most 8uκt(|d|₁ + |A|₁); the quotients, the point's
+//! difference with the light, and the product's own rounding add 6uκt|d|₁. So n·d − 1 has the right sign where it exceeds uκ(14|d|₁ + 12|A|₁), less than
+//! 42uκ times the sum of both largest components. [`Cone::side_error`] is 64uκ, which leaves room for its own rounding and that of the sum to single
+//! precision.
 
 use glam::{DVec2, DVec3, Vec3};
 use vdf_geometry::Triangle;

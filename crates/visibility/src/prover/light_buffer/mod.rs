@@ -6,14 +6,15 @@
 //!
 //! *Definition.* Depth is the largest component of the difference of point and light; with it the point's place on its face of the cube
 //! (`frame`). A triangle is a `cone` of directions and a plane. What certainly lies in front is a single triangle that covers a
-//! texel, or a sheet of several (`sheets`). A triangle is decided by its `record`. `build` makes all of it.
+//! texel, or a sheet of several (`sheets`). A triangle is decided by its `record`; of one alone that covers its texel only the plane is asked. Squares of texels
+//! (`tables`) decide most points in space. `build` makes all of it.
 //!
 //! *Guarantee.* An answer other than [`Answer::Unknown`] is exact: "unoccluded" if no triangle meets the closed segment, "occluded" if one
 //! does. Unlike proofs from voxels this is so for points on surfaces, too. *Departure from \[Haines1986\]:* there the lists are of all
 //! objects in the pyramid, from the near to the far; nothing bounds depths.
 //!
-//! *Cost.* In batches 4 to 10 ns where comparisons decide, 10 to 20 ns where a triangle is tested, more where memory is waited for; alone some three times
-//! as much. 8 bytes a texel, 8 bytes an entry of a list, 64 bytes a triangle that occurs.
+//! *Cost.* In batches 4 to 10 ns where comparisons decide, 8 to 15 ns where a triangle is tested, more where memory is waited for; alone two to three times
+//! as much. 8 bytes a texel and a quarter of one for its square, 8 bytes an entry of a list, 64 bytes a triangle that occurs.
 //!
 //! *Limits.* A light on an occluder has no buffer: every closed segment to it is blocked. Nor has one that is a thousand times as far away
 //! as the geometry is large. The hierarchy decides what is too close for the rounding of a record.
@@ -44,7 +45,8 @@ use super::Answer;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightBuffer {
     cube: Cube,
-    /// Texels of no face, those of the faces, then the parts of those that are divided; lists, of which the first and the last entry belong to none; records.
+    /// Texels of no face, those of the faces, then the parts of those that are divided; lists, of which the first and the last entry belong to none; records;
+    /// squares of the texels that are no parts.
     tables: Tables,
 }
 

@@ -1,7 +1,9 @@
 //! Where a query is looked up: its texel, and the code of its depth.
 //!
-//! *Idea.* All of it is arithmetic in single precision without a branch, so that the compiler makes vectors of it for many queries; one definition serves
-//! single queries, too. What has no texel in a window gets one of two texels of its own, so that nothing has to be remembered of it.
+//! *Idea.* All of it is arithmetic in single precision without a branch. Of many queries the compiler makes vectors, a component each, and what has no texel
+//! in a window gets one of two texels of its own, so that nothing has to be remembered of it. The components of a single query are a vector themselves: taken
+//! from memory by the number of the face they would wait for stores, and selected one by one they would become branches.
+//! Tests compare both.
 //!
 //! *Rounding.* See `frame`. Sums and products are rounded one by one, with every instruction set, so that places do not depend on it.
 
