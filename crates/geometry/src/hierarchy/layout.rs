@@ -41,7 +41,8 @@ pub(super) struct Node {
 }
 
 impl Node {
-    const EMPTY: Self = Self {
+    /// Without children.
+    pub(super) const EMPTY: Self = Self {
         planes: [[[Vec4::INFINITY; REGISTERS], [Vec4::NEG_INFINITY; REGISTERS]]; 3],
         children: [Child(0); CHILDREN],
         rest: [0; 8],
@@ -50,13 +51,18 @@ impl Node {
     /// A node with these boxes, at most eight; its children are not known yet.
     pub(super) fn new(boxes: impl Iterator<Item = TreeBox>) -> Self {
         let mut node = Self::EMPTY;
-        for (i, bounds) in boxes.take(CHILDREN).enumerate() {
-            for (axis, planes) in node.planes.iter_mut().enumerate() {
-                planes[0][i / WIDTH][i % WIDTH] = bounds.min[axis];
-                planes[1][i / WIDTH][i % WIDTH] = bounds.max[axis];
-            }
-        }
+        boxes.take(CHILDREN).enumerate().for_each(|(i, bounds)| node.set_box(i, bounds));
         node
+    }
+
+    /// Gives a child its box.
+    #[inline(always)]
+    pub(super) fn set_box(&mut self, i: usize, TreeBox { min, max }: TreeBox) {
+        let planes: &mut [[[f32; CHILDREN]; 2]; 3] = bytemuck::cast_mut(&mut self.planes);
+        let i = i & (CHILDREN - 1);
+        for (axis, [lower, upper]) in planes.iter_mut().enumerate() {
+            (lower[i], upper[i]) = (min[axis], max[axis]);
+        }
     }
 }
 
@@ -125,16 +131,35 @@ pub(super) const NONE: u32 = u32::MAX;
 impl Leaf {
     /// The leaf of these triangles, at most four.
     pub(super) fn new(triangles: &[Triangle], numbers: &[u32]) -> Self {
-        let mut leaf = Self { vertices: [[[0.0; WIDTH]; 3]; 3], numbers: [NONE; WIDTH] };
-        for (i, &number) in numbers.iter().take(WIDTH).enumerate() {
-            leaf.numbers[i] = number;
-            for (v, vertex) in triangles[number as usize].vertices.iter().enumerate() {
-                for axis in 0..3 {
-                    leaf.vertices[axis][v][i] = vertex[axis];
+        let mut all = [NONE; WIDTH];
+        all.iter_mut().zip(numbers).for_each(|(place, &number)| *place = number);
+        let mut leaf = [Self::zeroed()];
+        Self::fill(&mut leaf, triangles, &[all]);
+        leaf[0]
+    }
+
+    /// The leaves of the triangles with these numbers.
+    pub(super) fn fill(leaves: &mut [Self], triangles: &[Triangle], numbers: &[[u32; WIDTH]]) {
+        // Some leaves at once: what is loaded from anywhere is only copied at first, so that many loads wait side by side.
+        const SOME: usize = 8;
+        for (leaves, numbers) in leaves.chunks_mut(SOME).zip(numbers.chunks(SOME)) {
+            let mut near = [[Triangle { vertices: [Vec3::ZERO; 3] }; WIDTH]; SOME];
+            for (near, numbers) in near.iter_mut().zip(numbers) {
+                for (triangle, &number) in near.iter_mut().zip(numbers) {
+                    if number != NONE {
+                        *triangle = triangles[number as usize];
+                    }
                 }
             }
+            for ((leaf, near), &numbers) in leaves.iter_mut().zip(&near).zip(numbers) {
+                for axis in 0..3 {
+                    for v in 0..3 {
+                        leaf.vertices[axis][v] = [0, 1, 2, 3].map(|i| near[i].vertices[v][axis]);
+                    }
+                }
+                leaf.numbers = numbers;
+            }
         }
-        leaf
     }
 
     /// How many triangles it has.

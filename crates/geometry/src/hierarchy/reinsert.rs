@@ -27,6 +27,13 @@ pub(super) struct Branch {
     pub(super) leaf: u32,
 }
 
+impl Branch {
+    /// Without children.
+    pub(super) fn new(hull: Hull, parent: u32) -> Self {
+        Self { hull, area: hull.area(), parent, first: 0, leaf: 0 }
+    }
+}
+
 /// How many rounds there are.
 const ROUNDS: usize = 16;
 
@@ -60,17 +67,21 @@ pub(super) fn reinsert(branches: &mut Vec<Branch>) {
     let mut touched = vec![0_u32; branches.len()];
     // None are left at the end if boxes may be out of date.
     let mut steps = STEPS * branches.len();
-    let mut order: Vec<usize> = Vec::new();
+    // The largest, as they are at first; moves change few of them.
+    let mut order: Vec<usize> = (1..branches.len()).collect();
+    let larger = |&i: &usize, &j: &usize| branches[j].area.total_cmp(&branches[i].area).then(i.cmp(&j));
+    let most = branches.len() / SHARE;
+    if most == 0 {
+        return;
+    }
+    order.select_nth_unstable_by(most.min(branches.len() - 2), larger);
+    order.truncate(most);
+    order.sort_unstable_by(larger);
     for round in 0..ROUNDS {
-        let count = branches.len() / SHARE / (2 * round + 1);
-        if count == 0 {
+        order.truncate(most / (2 * round + 1));
+        if order.is_empty() {
             break;
         }
-        order.clear();
-        order.extend(1..branches.len());
-        let larger = |&i: &usize, &j: &usize| branches[j].area.total_cmp(&branches[i].area).then(i.cmp(&j));
-        order.select_nth_unstable_by(count.min(branches.len() - 2), larger);
-        order.truncate(count);
         let mut moves: Vec<Move> = order.par_iter().filter_map(|&i| search(branches, i)).collect();
         moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
         let mark = u32::try_from(round + 1).unwrap_or(u32::MAX);
@@ -162,7 +173,7 @@ fn apply(branches: &mut [Branch], from: usize, to: usize, steps: &mut usize) {
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "there are less than 2^32 branches")]
-fn low_bits(i: usize) -> u32 {
+pub(super) fn low_bits(i: usize) -> u32 {
     i as u32
 }
 

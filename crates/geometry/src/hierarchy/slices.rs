@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
-use super::space::TreeBox;
+use super::{layout::WIDTH, space::TreeBox};
 
 /// How many of the divisions above a set may leave more than seven eighths on one side. One more, and the set
 /// is divided in the middle.
@@ -19,7 +19,7 @@ pub(super) const UNEVEN: u32 = 16;
 pub(super) const ALONE: usize = 4096;
 
 /// Sets from this size on are looked at by several threads at once.
-const TOGETHER: usize = 1 << 16;
+pub(super) const TOGETHER: usize = 1 << 16;
 
 /// A triangle's padded box and its number. The number is in `max.w`, see [`Item::new`].
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -171,6 +171,15 @@ impl<const N: usize> Slices<N> {
         }
     }
 
+    /// Adds a set with this box to a slice of each axis.
+    #[inline(always)]
+    pub(super) fn add_set(&mut self, slices: [usize; 3], hull: Hull, count: u32) {
+        for (axis, i) in slices.into_iter().enumerate() {
+            self.hulls[axis][i] = self.hulls[axis][i].union(hull);
+            self.counts[axis][i] += count;
+        }
+    }
+
     pub(super) fn union(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             for i in 0..N {
@@ -220,22 +229,16 @@ impl<const N: usize> Slices<N> {
     }
 }
 
-/// How a large set was divided; its items are in that order.
-pub(super) struct Division {
-    pub(super) lower: usize,
-    pub(super) hulls: [Hull; 2],
-    pub(super) uneven: u32,
-    pub(super) below: [Option<Box<Division>>; 2],
-}
-
 /// Divides a set in two: how many are on the lower side, which are moved to the front, and the hulls of both. At least
 /// two items.
 pub(super) fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
     let centres = Hull::of_centres(items);
+    let e = centres.max - centres.min;
+    let longest = if e.x >= e.y && e.x >= e.z { 0 } else { 1 + usize::from(e.y < e.z) };
     if uneven <= UNEVEN {
         // With few triangles the slices, not the triangles, take the time.
         let cheapest = match items.len() {
-            ..=8 => divide_cheapest::<4>(items, centres),
+            0..=FEW => divide_sorted(items, longest),
             9..=64 => divide_cheapest::<8>(items, centres),
             _ => divide_cheapest::<16>(items, centres),
         };
@@ -245,15 +248,78 @@ pub(super) fn divide(items: &mut [Item], uneven: u32) -> (usize, [Hull; 2]) {
     }
     // In the middle along the longest axis; equal centres in the order that they have.
     let middle = items.len() / 2;
-    let e = centres.max - centres.min;
-    let axis = if e.x >= e.y && e.x >= e.z { 0 } else { 1 + usize::from(e.y < e.z) };
-    if e[axis] > 0.0 {
+    if e[longest] > 0.0 {
         items.select_nth_unstable_by(middle, |a, b| {
-            a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.number().cmp(&b.number()))
+            a.centre()[longest].total_cmp(&b.centre()[longest]).then(a.number().cmp(&b.number()))
         });
     }
     let (lower, upper) = items.split_at(middle);
     (middle, [Hull::of(lower), Hull::of(upper)])
+}
+
+/// So many items are sorted in place of slices.
+const FEW: usize = 8;
+
+/// A sorting network \[Batcher1968\]: exchanges of two places that sort eight.
+const EXCHANGES: [(usize, usize); 19] = [
+    (0, 1),
+    (2, 3),
+    (4, 5),
+    (6, 7),
+    (0, 2),
+    (1, 3),
+    (4, 6),
+    (5, 7),
+    (1, 2),
+    (5, 6),
+    (0, 4),
+    (1, 5),
+    (2, 6),
+    (3, 7),
+    (2, 4),
+    (3, 5),
+    (1, 2),
+    (3, 4),
+    (5, 6),
+];
+
+/// The cheapest division between two of up to eight items in the order of their centres along an axis. `None` if no cost is a number.
+#[allow(clippy::cast_precision_loss, reason = "a cost")]
+fn divide_sorted(items: &mut [Item], axis: usize) -> Option<(usize, [Hull; 2])> {
+    let n = items.len().min(FEW);
+    // Numbers in the order of the centres, with the item's place behind; so equal ones stay in order.
+    let mut keys = [u64::MAX; FEW];
+    for (i, (key, item)) in keys.iter_mut().zip(&*items).enumerate() {
+        let [min, max] = bytemuck::cast_ref::<Item, [[f32; 4]; 2]>(item);
+        let bits = (min[axis & 3] + max[axis & 3]).to_bits();
+        let ordered = bits ^ if bits >> 31 == 1 { u32::MAX } else { 1 << 31 };
+        *key = u64::from(ordered) << 32 | i as u64;
+    }
+    for (a, b) in EXCHANGES {
+        (keys[a], keys[b]) = (keys[a].min(keys[b]), keys[a].max(keys[b]));
+    }
+    let mut sorted = [Item { min: Vec4::ZERO, max: Vec4::ZERO }; FEW];
+    for (place, key) in sorted[..n].iter_mut().zip(keys) {
+        *place = items[(key & (FEW as u64 - 1)) as usize];
+    }
+    items[..n].copy_from_slice(&sorted[..n]);
+    let mut below = [Hull::EMPTY; FEW + 1];
+    for (i, item) in sorted[..n].iter().enumerate() {
+        below[i + 1] = below[i].with(item.min, item.max);
+    }
+    // So few are one leaf or two: to count triangles would make half-empty ones of equal triangles.
+    let leaves = |n: usize| n.div_ceil(WIDTH) as f32;
+    let mut above = Hull::EMPTY;
+    let mut best = (f32::INFINITY, 0, above);
+    for i in (1..n).rev() {
+        above = above.with(sorted[i].min, sorted[i].max);
+        let cost = below[i].area() * leaves(i) + above.area() * leaves(n - i);
+        if cost < best.0 {
+            best = (cost, i, above);
+        }
+    }
+    let (_, lower, above) = best;
+    (lower > 0).then_some((lower, [below[lower], above]))
 }
 
 /// The division between two of `N` slices that costs least. `None` if all centres are in one slice.
@@ -261,13 +327,13 @@ pub(super) fn divide_cheapest<const N: usize>(items: &mut [Item], centres: Hull)
     let slicing = Slicing::<N>::new(centres);
     let (axis, last, hulls) = Slices::of(items, &slicing).cheapest()?;
     let along = slicing.along(axis);
-    Some((partition(items, |item| along.slice(item) <= last), hulls))
+    Some((partition_by(items, |item| along.slice(item) <= last), hulls))
 }
 
-/// Moves the items that belong to the lower side to the front and counts them. Without a branch, which would be guessed
+/// Moves what belongs to the lower side to the front and counts it. Without a branch, which would be guessed
 /// wrongly as often as not.
 #[inline(always)]
-pub(super) fn partition(items: &mut [Item], is_lower: impl Fn(&Item) -> bool) -> usize {
+pub(super) fn partition_by<T: Copy>(items: &mut [T], is_lower: impl Fn(&T) -> bool) -> usize {
     let mut lower = 0;
     for i in 0..items.len() {
         let goes = usize::from(is_lower(&items[i]));
@@ -282,18 +348,4 @@ pub(super) fn partition(items: &mut [Item], is_lower: impl Fn(&Item) -> bool) ->
 /// The count of uneven divisions below a division.
 pub(super) fn count_uneven(uneven: u32, lower: usize, all: usize) -> u32 {
     uneven + u32::from(lower.max(all - lower) > all - all / 8)
-}
-
-/// Divides large sets in parallel, down to those that a thread builds alone.
-pub(super) fn divide_large(items: &mut [Item], uneven: u32, bunch: usize) -> Option<Box<Division>> {
-    if items.len() <= bunch {
-        return None;
-    }
-    let items_len = items.len();
-    let (lower, hulls) = divide(items, uneven);
-    let uneven = count_uneven(uneven, lower, items_len);
-    let (a, b) = items.split_at_mut(lower);
-    let (mut of_a, mut of_b) = (|| divide_large(a, uneven, bunch), || divide_large(b, uneven, bunch));
-    let (below_a, below_b) = if items_len > ALONE { rayon::join(of_a, of_b) } else { (of_a(), of_b()) };
-    Some(Box::new(Division { lower, hulls, uneven, below: [below_a, below_b] }))
 }

@@ -25,6 +25,13 @@ pub(super) enum Table<T> {
 impl<T: Pod + Send + Sync> Table<T> {
     /// So many values, each a function of its place; in parallel.
     pub(super) fn new(len: usize, value: impl Fn(usize) -> T + Send + Sync) -> Self {
+        let mut table = Self::zeroed(len);
+        table.par_iter_mut().enumerate().for_each(|(i, place)| *place = value(i));
+        table
+    }
+
+    /// So many values of zero bytes.
+    pub(super) fn zeroed(len: usize) -> Self {
         #[cfg(unix)]
         if len >= LARGE / size_of::<T>()
             && let Some(bytes) = len.checked_mul(size_of::<T>())
@@ -35,11 +42,9 @@ impl<T: Pod + Send + Sync> Table<T> {
                 // Without huge pages it works as well.
                 let _refused = memory.advise(memmap2::Advice::HugePage);
             }
-            let mut table = Self::Large(memory);
-            table.par_iter_mut().enumerate().for_each(|(i, place)| *place = value(i));
-            return table;
+            return Self::Large(memory);
         }
-        Self::Small((0..len).into_par_iter().map(value).collect())
+        Self::Small(vec![T::zeroed(); len])
     }
 }
 
