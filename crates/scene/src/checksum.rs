@@ -365,11 +365,7 @@ impl Sum {
         match projection {
             Projection::Perspective { tan_half_fov_x, lens, principal_point } => {
                 self.doubles(&[*tan_half_fov_x, *near_clip, *far_clip]);
-                // In the middle it leaves the checksums of older files as they are.
-                if *principal_point != [0.0; 2] {
-                    self.doubles(principal_point);
-                    self.words(&[2]);
-                }
+                self.doubles(principal_point);
                 if let Some(Lens { radius, focus_distance }) = lens {
                     self.doubles(&[*radius, *focus_distance]);
                 }
