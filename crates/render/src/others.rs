@@ -92,6 +92,11 @@ impl OtherShapes {
         self.veils.triangles.get(number)
     }
 
+    /// The opaque curved shapes.
+    pub(crate) const fn curved(&self) -> &CurvedSet {
+        &self.curved
+    }
+
     /// Bounds of all of them.
     pub(crate) fn bounds(&self) -> Bounds {
         self.curved.bounds().union(*self.veils.bvh.bounds()).union(*self.veils.curved.bounds())

@@ -6,7 +6,7 @@ use std::{
 };
 
 use glam::{DVec3, Vec2, dvec3, vec2};
-use vdf_geometry::{Bounds, Bvh, CurvedKind, CurvedShape, Hit, Segment, Triangle};
+use vdf_geometry::{Bounds, Bvh, CurvedKind, CurvedSet, CurvedShape, Hit, Segment, Triangle};
 use vdf_scene::{Bsdf, Emitter, Extinction, Medium, MeshAttributes, Rgb, Scene, Texture, TexturePoint};
 use vdf_visibility::LightShape;
 
@@ -221,6 +221,12 @@ impl World {
             GridExtent::Occluders => &self.occluder_bounds,
             GridExtent::Scene => &self.bounds,
         }
+    }
+
+    /// The opaque curved shapes, of which no prover knows; `None` if there are none.
+    #[must_use]
+    pub fn curved(&self) -> Option<&CurvedSet> {
+        self.others.as_ref().map(|others| others.curved()).filter(|curved| !curved.is_empty())
     }
 
     /// The surface at a hit, for a ray of direction `direction`.

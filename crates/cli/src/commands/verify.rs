@@ -70,7 +70,7 @@ fn verdict(report: &VerifyReport) -> Result<(), Failure> {
         "{} of {} proofs are wrong; the references disagree on {} segments",
         report.total.wrong,
         report.total.proofs,
-        report.checks.disagreements
+        report.checks.disagreements + report.checks.curved_disagreements
     )))
 }
 
@@ -82,7 +82,7 @@ mod tests {
 
     use super::*;
 
-    fn report(wrong: u64, disagreements: u64) -> VerifyReport {
+    fn report(wrong: u64, disagreements: u64, curved_disagreements: u64) -> VerifyReport {
         VerifyReport {
             version: "0",
             seed: 0,
@@ -93,15 +93,15 @@ mod tests {
             classes: vec![],
             total: Tally { segments: 9, proved: 5, proofs: 7, wrong },
             methods: vec![],
-            checks: Checks { disagreements, ..Checks::default() },
+            checks: Checks { disagreements, curved_disagreements, ..Checks::default() },
             failures: vec![],
         }
     }
 
     #[test]
     fn a_wrong_proof_or_a_disagreement_fails_with_1() {
-        assert!(verdict(&report(0, 0)).is_ok());
-        for report in [report(2, 0), report(0, 1)] {
+        assert!(verdict(&report(0, 0, 0)).is_ok());
+        for report in [report(2, 0, 0), report(0, 1, 0), report(0, 0, 1)] {
             assert_eq!(verdict(&report).unwrap_err().report(), ExitCode::from(1));
         }
     }

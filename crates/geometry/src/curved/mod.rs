@@ -183,9 +183,11 @@ impl CurvedShape {
         self.meets_with::<Bounded>(segment).unwrap_or_else(|| self.meets_exactly(segment))
     }
 
+    /// The slow twin of [`CurvedShape::meets`]: exact arithmetic alone, without a look at the shape's box. Cost: some microseconds.
     #[cold]
-    fn meets_exactly(&self, segment: &Segment) -> bool {
-        self.meets_with::<Expansion>(segment).unwrap_or(false)
+    #[must_use]
+    pub fn meets_exactly(&self, segment: &Segment) -> bool {
+        segment.p.is_finite() && segment.q.is_finite() && self.meets_with::<Expansion>(segment).unwrap_or(false)
     }
 
     /// A·p + t.

@@ -135,6 +135,7 @@ fn verify_in_pool(
     let names: Vec<_> = options.methods.iter().map(|m| m.name()).collect();
     progress.work_total(options.segments);
 
+    let classes = SegmentClass::of(world);
     let mut sum = Sum::new(names.len());
     let mut grids = Vec::new();
     let mut seconds = 0.0;
@@ -173,12 +174,13 @@ fn verify_in_pool(
             names: &names,
             generator: Generator::new(prepared.scene(), world, grid, options.seed, number),
             oracle: &oracle,
+            classes: &classes,
             voxel_size,
         };
         sum = sum.plus(run.all(to - from, progress)?);
         seconds += start.elapsed().as_secs_f64();
     }
-    let classes = SegmentClass::ALL.iter().zip(&sum.classes);
+    let classes = classes.into_iter().map(|class| (class, sum.classes[class as usize]));
     let mut total = Tally::default();
     sum.classes.iter().for_each(|&t| total += t);
     Ok(VerifyReport {
@@ -188,7 +190,7 @@ fn verify_in_pool(
         triangles: world.triangles.len(),
         grids,
         seconds,
-        classes: classes.map(|(&class, &tally)| ClassTally { class, tally, bound: tally.bound() }).collect(),
+        classes: classes.map(|(class, tally)| ClassTally { class, tally, bound: tally.bound() }).collect(),
         total,
         methods: names.iter().zip(&sum.methods).map(|(m, &[n, wrong])| MethodTally::new(m, n, wrong)).collect(),
         checks: sum.checks,
@@ -252,6 +254,7 @@ struct Run<'a> {
     names: &'a [&'static str],
     generator: Generator<'a>,
     oracle: &'a Oracle<'a>,
+    classes: &'a [SegmentClass],
     voxel_size: f64,
 }
 
@@ -264,7 +267,7 @@ struct Scratch {
 
 impl Run<'_> {
     fn all(&self, segments: u64, progress: &dyn Progress) -> Result<Sum, RenderError> {
-        let classes = CLASSES as u64;
+        let classes = self.classes.len() as u64;
         // The largest share of a class, in blocks; classes take turns.
         let blocks = segments.div_ceil(classes).div_ceil(BLOCK);
         (0..blocks * classes)
@@ -277,7 +280,7 @@ impl Run<'_> {
                 let share = part(segments, class + 1, classes) - part(segments, class, classes);
                 let indices = share.min(block * BLOCK)..share.min((block + 1) * BLOCK);
                 let n = indices.end - indices.start;
-                let sum = self.block(SegmentClass::ALL[class as usize], indices, scratch);
+                let sum = self.block(self.classes[class as usize], indices, scratch);
                 progress.work_done(n);
                 Ok(sum)
             })
@@ -302,12 +305,14 @@ impl Run<'_> {
 
     fn check(&self, sum: &mut Sum, class: SegmentClass, index: u64, query: &Query, claims: Claims) {
         let proved = claims != Claims::default();
-        let truth = self.oracle.ask(&query.segment, index, proved);
+        let truth = self.oracle.ask(&query.segment, index, proved, class == SegmentClass::Curved);
         sum.checks += Checks {
             proved_by_hierarchy: u64::from(proved && truth.by_hierarchy.is_some()),
             proved_by_loop: u64::from(proved && truth.by_loop.is_some()),
             compared: u64::from(truth.by_hierarchy.is_some() && truth.by_loop.is_some()),
             disagreements: u64::from(truth.disagrees()),
+            curved: u64::from(truth.curved.is_some()),
+            curved_disagreements: u64::from(truth.disagrees_about_curved()),
         };
         // One and the same method may claim both.
         let wrong_unoccluded = if truth.says(true) { claims.unoccluded } else { 0 };
@@ -324,7 +329,7 @@ impl Run<'_> {
             *proofs += u64::from(made >> bit & 1);
             *wrongs += u64::from(wrong >> bit & 1);
         }
-        if wrong != 0 || truth.disagrees() {
+        if wrong != 0 || truth.disagrees() || truth.disagrees_about_curved() {
             sum.failures.push(self.failure(class, index, query, truth, wrong));
             sum.failures.truncate(TOLD);
         }
@@ -343,6 +348,7 @@ impl Run<'_> {
             to: query.segment.q.to_array(),
             occluded_by_hierarchy: truth.by_hierarchy,
             occluded_by_loop: truth.by_loop,
+            meets_curved: truth.curved,
         }
     }
 }

@@ -120,6 +120,10 @@ pub struct Checks {
     pub compared: u64,
     /// Those on which they do not agree. Must be 0.
     pub disagreements: u64,
+    /// Segments that the set of curved shapes was asked about, and a loop over them in exact arithmetic.
+    pub curved: u64,
+    /// Those on which these two do not agree. Must be 0.
+    pub curved_disagreements: u64,
 }
 
 impl AddAssign for Checks {
@@ -128,6 +132,8 @@ impl AddAssign for Checks {
         self.proved_by_loop += other.proved_by_loop;
         self.compared += other.compared;
         self.disagreements += other.disagreements;
+        self.curved += other.curved;
+        self.curved_disagreements += other.curved_disagreements;
     }
 }
 
@@ -152,13 +158,15 @@ pub struct Failure {
     pub occluded_by_hierarchy: Option<bool>,
     /// Whether the loop finds an occluder, if it was run.
     pub occluded_by_loop: Option<bool>,
+    /// Whether a curved shape meets it, by any hit of their set, by its first hit and by a loop, if these were asked.
+    pub meets_curved: Option<[bool; 3]>,
 }
 
 impl VerifyReport {
     /// Whether no proof is wrong and the references agree.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.total.wrong == 0 && self.checks.disagreements == 0
+        self.total.wrong == 0 && self.checks.disagreements == 0 && self.checks.curved_disagreements == 0
     }
 }
 
@@ -193,7 +201,14 @@ impl fmt::Display for Failure {
         let [x, y, z] = [0, 1, 2].map(|axis| (to[axis] - from[axis]) / self.voxel_size);
         write!(f, ": from {from:?} to {to:?}, {:.3e} voxels long", x.hypot(y).hypot(z))?;
         write!(f, "; hierarchy: {}, loop: ", said(self.occluded_by_hierarchy))?;
-        f.write_str(said(self.occluded_by_loop))
+        f.write_str(said(self.occluded_by_loop))?;
+        match self.meets_curved {
+            Some(met) => {
+                let [any, first, by_loop] = met.map(|met| said(Some(met)));
+                write!(f, "; by curved shapes: any hit {any}, first hit {first}, loop {by_loop}")
+            }
+            None => Ok(()),
+        }
     }
 }
 
@@ -235,6 +250,13 @@ impl fmt::Display for VerifyReport {
             "the two were compared on {} segments, proved or not; they disagree on {}",
             c.compared, c.disagreements
         )?;
+        if c.curved > 0 {
+            write!(
+                f,
+                "\ncurved shapes were compared with exact arithmetic on {} segments; they disagree on {}",
+                c.curved, c.curved_disagreements
+            )?;
+        }
         for failure in &self.failures {
             write!(f, "\nWRONG {failure}")?;
         }

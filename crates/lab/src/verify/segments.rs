@@ -8,9 +8,11 @@
 //! threads. In all classes but the first two, half of the segments end on a light if there is one: those are what
 //! safe neighbourhoods are asked about.
 
-use glam::DVec3;
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
 use serde::Serialize;
-use vdf_geometry::{Bounds, Segment, Triangle};
+use vdf_geometry::{Bounds, CurvedKind, CurvedSet, Segment, Triangle};
 use vdf_render::{Sampler, World, light_shapes};
 use vdf_scene::Scene;
 use vdf_visibility::LightShape;
@@ -46,11 +48,14 @@ pub enum SegmentClass {
     /// Towards a point light along the borders and corners of the texels of its light buffer, the seams and the diagonals
     /// of its cube, from before, on and behind what is met there.
     Texel,
+    /// Through, to, closely past, inside of and tangent to a curved occluder, and through its rim. No prover knows of these, but every query is tested
+    /// against them. Only in scenes that have some.
+    Curved,
 }
 
 impl SegmentClass {
     /// All classes.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Random,
         Self::Light,
         Self::Vertex,
@@ -63,7 +68,13 @@ impl SegmentClass {
         Self::Outside,
         Self::Occupied,
         Self::Texel,
+        Self::Curved,
     ];
+
+    /// Those that are asked about in a scene.
+    pub(super) fn of(world: &World) -> Vec<Self> {
+        Self::ALL.into_iter().filter(|class| *class != Self::Curved || world.curved().is_some()).collect()
+    }
 
     /// The name in reports.
     #[must_use]
@@ -81,6 +92,7 @@ impl SegmentClass {
             Self::Outside => "outside",
             Self::Occupied => "occupied",
             Self::Texel => "texel",
+            Self::Curved => "curved",
         }
     }
 }
@@ -151,6 +163,7 @@ impl<'a> Generator<'a> {
                 self.onwards(draw, p)
             }
             SegmentClass::Texel => self.along_texels(draw),
+            SegmentClass::Curved => self.at_curved(draw),
         }
     }
 
@@ -178,6 +191,37 @@ impl<'a> Generator<'a> {
             None => draw.unit(),
         };
         Query { segment: Segment::new(nudged(draw, q + d * (reach * along)), q), emitter: Some(emitter) }
+    }
+
+    fn at_curved(&self, draw: &mut Draw) -> Query {
+        let Some(shapes) = self.world.curved().map(CurvedSet::shapes) else { return self.to_emitter(draw) };
+        let shape = &shapes[draw.pick(shapes.len())];
+        // Poles, rims and quarters as often as anything between.
+        let angle = if draw.chance(0.3) { draw.of(&[0.0, 0.25, 0.5, 0.75]) } else { draw.unit() } * TAU;
+        let along = if draw.chance(0.3) { draw.of(&[0.0, 1.0]) } else { draw.unit() };
+        let local = match shape.kind() {
+            CurvedKind::Sphere => {
+                DVec2::from_angle(angle).extend(0.0) * (1.0 - along * along).sqrt() + DVec3::Z * along
+            }
+            CurvedKind::Disk => DVec2::from_angle(angle).extend(0.0) * along,
+            CurvedKind::Cylinder => DVec2::from_angle(angle).extend(along),
+        };
+        let local = if shape.kind() == CurvedKind::Sphere && draw.chance(0.5) { -local } else { local };
+        let size = shape.bounds().extent().max_element();
+        let normal = shape.normal(local);
+        let beside = normal * (draw.of(&BESIDE) * draw.of(&[0.1, -0.1]) * size);
+        let point = nudged(draw, shape.to_world(local) + beside);
+        match draw.pick(3) {
+            // Tangent.
+            0 => {
+                let (along, across) = normal.any_orthonormal_pair();
+                let direction = along.lerp(across, draw.unit()) * size;
+                let [before, behind] = [(); 2].map(|()| draw.of(&[0.0, 1e-9, 0.1, 1.0, 3.0]));
+                between(point - direction * before, nudged(draw, point + direction * behind))
+            }
+            1 => self.onwards(draw, point),
+            _ => self.through(draw, |_, _| point),
+        }
     }
 
     fn to_emitter(&self, draw: &mut Draw) -> Query {

@@ -1,7 +1,7 @@
 //! Liars must be caught, and what is asked must not depend on threads.
 
-use glam::{DMat4, DVec3, Vec3};
-use vdf_geometry::{Segment, Triangle};
+use glam::{DMat3, DMat4, DVec3, Vec3};
+use vdf_geometry::{CurvedKind, CurvedShape, Segment, Triangle};
 use vdf_render::World;
 use vdf_scene::{
     Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, PixelRect, Projection, ReconstructionFilter, Rgb,
@@ -102,6 +102,7 @@ fn asked(liar: &Liar, segments: u64) -> Sum {
         names: &["none", "liar"],
         generator: Generator::new(&scene, &world, grid, 3, 0),
         oracle: &Oracle::new(&world),
+        classes: &SegmentClass::of(&world),
         voxel_size: 0.125,
     };
     run.all(segments, &Quiet(false)).unwrap()
@@ -111,7 +112,7 @@ fn asked(liar: &Liar, segments: u64) -> Sum {
 fn a_liar_is_caught_in_every_class() {
     for answer in [Answer::Unoccluded, Answer::Occluded] {
         let sum = asked(&Liar::Always(answer), 24_000);
-        for (class, t) in SegmentClass::ALL.iter().zip(&sum.classes) {
+        for (class, t) in SegmentClass::ALL[..12].iter().zip(&sum.classes) {
             assert_eq!((t.segments, t.proved, t.proofs), (2000, 2000, 2000), "{class:?}");
             assert!(t.wrong > 0 && t.wrong < t.proofs, "{class:?}: {t:?}");
             assert_eq!(t.bound(), None);
@@ -154,6 +155,7 @@ fn a_failure_can_be_repeated_from_its_text() {
         to: [1.0; 3],
         occluded_by_hierarchy: Some(true),
         occluded_by_loop: None,
+        meets_curved: None,
     };
     assert_eq!(
         failure.to_string(),
@@ -215,6 +217,57 @@ fn bad_options_and_a_wish_to_stop_are_errors() {
     assert!(matches!(verify(scene(), &options, &Quiet(true)), Err(LabError::Render(RenderError::Cancelled))));
 }
 
+/// A sphere, a disk and a cylinder beside the wall.
+fn scene_with_curved_shapes() -> Scene {
+    let shape = |kind, at, size| CurvedShape::new(kind, DMat3::from_diagonal(size), at, false).unwrap();
+    let shapes = [
+        shape(CurvedKind::Sphere, DVec3::new(0.2, 0.3, 0.4), DVec3::new(0.2, 0.1, 0.15)),
+        shape(CurvedKind::Disk, DVec3::new(0.8, 0.5, 0.5), DVec3::splat(0.3)),
+        shape(CurvedKind::Cylinder, DVec3::new(0.8, 0.2, 0.1), DVec3::new(0.1, 0.1, 0.7)),
+    ];
+    let mut scene = scene();
+    scene.surfaces.extend(shapes.map(|shape| Surface {
+        triangles: vec![],
+        curved: Some(shape),
+        bsdf: Bsdf::lambertian(Rgb::ONE, Rgb::ONE),
+        ..Surface::default()
+    }));
+    scene
+}
+
+#[test]
+fn curved_shapes_are_compared_with_exact_arithmetic() {
+    let scene = scene_with_curved_shapes();
+    let world = World::new(&scene);
+    let report =
+        verify(scene.clone(), &VerifyOptions { segments: 52_000, ..Default::default() }, &Quiet(false)).unwrap();
+    assert!(report.is_sound(), "{report}");
+    let class = report.classes.iter().find(|c| c.class == SegmentClass::Curved).unwrap();
+    assert_eq!(class.tally.segments, 4000);
+    // One of the class in as many as there are shapes, and one in eight times as many of the others.
+    assert_eq!(report.checks.curved, 4000_u64.div_ceil(3) + 12 * 4000_u64.div_ceil(24));
+    assert!(report.to_string().contains("they disagree on 0"), "{report}");
+
+    // The class holds what it is for: hits and misses, both next to each other.
+    let grid = grid_over(&world.bounds, 0.125, 1 << 20).unwrap();
+    let generator = Generator::new(&scene, &world, grid, 0, 0);
+    let hits = (0..2000).filter(|&i| {
+        let query = generator.query(SegmentClass::Curved, i);
+        world.curved().is_some_and(|curved| curved.occluded(&query.segment))
+    });
+    assert!((400..1800).contains(&hits.count()));
+}
+
+#[test]
+fn a_wrong_answer_about_curved_shapes_is_a_failure() {
+    for wrong in [[true, false, false], [false, true, false], [false, false, true], [true, true, false]] {
+        let truth = Truth { by_hierarchy: None, by_loop: None, curved: Some(wrong) };
+        assert!(truth.disagrees_about_curved() && !truth.disagrees());
+    }
+    let truth = Truth { by_hierarchy: Some(true), by_loop: Some(true), curved: Some([true; 3]) };
+    assert!(!truth.disagrees_about_curved());
+}
+
 /// Every class must reach the cases that it is for: this counts them.
 #[test]
 fn classes_are_what_they_say() {
@@ -228,7 +281,7 @@ fn classes_are_what_they_say() {
     let whole = |x: f64| (x * 8.0).fract() == 0.0;
     assert_eq!(count(SegmentClass::Random, &|q| q.emitter.is_none() && inside(q.segment.p)), 2000);
     assert_eq!(count(SegmentClass::Light, &|q| q.emitter.is_some()), 2000);
-    for class in SegmentClass::ALL.into_iter().skip(2) {
+    for class in SegmentClass::of(&world).into_iter().skip(2) {
         let ends_in_light = |q: &Query| q.emitter.is_some_and(|e| q.segment.q == DVec3::splat(e as f64));
         assert!(count(class, &ends_in_light) > 200, "{class:?}");
         assert_eq!(count(class, &|q| q.emitter.is_some() && !ends_in_light(q)), 0, "{class:?}");
