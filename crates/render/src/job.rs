@@ -2,6 +2,7 @@
 //!
 //! Every random number is a function of (seed, pixel, sample, dimension), so a path is the same whoever follows it, and in whatever order.
 
+use pulp::Arch;
 use vdf_scene::{PixelRect, Rgb};
 use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
@@ -134,6 +135,7 @@ impl<'a> Job<'a> {
             transmittance: self.options.transmittance,
             roulette: self.options.roulette,
             estimator: self.options.estimator,
+            arch: Arch::new(),
             progress,
         }
     }

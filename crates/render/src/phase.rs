@@ -62,8 +62,8 @@ impl PhaseFunction for Phase {
 }
 
 /// The density of Henyey–Greenstein with mean cosine `g`.
-#[inline]
-fn pdf_lobe(g: f64, from: DVec3, to: DVec3) -> f64 {
+#[inline(always)]
+pub(crate) fn pdf_lobe(g: f64, from: DVec3, to: DVec3) -> f64 {
     // 1 + g² − 2g cos θ = (1 − g)² + 2g(1 − cos θ) = (1 − g)² + g|to − from|²; for g < 0 mirrored. Nothing cancels: 1 − cos θ would,
     // at a peak as narrow as 1 − |g|.
     let (a, apart) = if g >= 0.0 { (g, to - from) } else { (-g, to + from) };

@@ -102,6 +102,15 @@ impl Sampler {
         }
     }
 
+    /// Passes over so many numbers.
+    #[inline]
+    pub(crate) fn skip(&mut self, numbers: u32) {
+        self.counter = self.counter.wrapping_add(WEYL.wrapping_mul(numbers.into()));
+        if let Some(sobol) = &mut self.sobol {
+            sobol.skip(numbers);
+        }
+    }
+
     /// Two uniform numbers in [0, 1).
     #[inline]
     pub fn next_2d(&mut self) -> [f64; 2] {
@@ -110,6 +119,21 @@ impl Sampler {
 }
 
 impl Sobol {
+    #[inline]
+    fn take_four(&mut self) {
+        self.four = sobol_burley::sample_4d(self.index, self.dimension / 4, self.seed);
+    }
+
+    #[inline]
+    fn skip(&mut self, numbers: u32) {
+        let last = self.dimension;
+        self.dimension = (last + numbers).min(SOBOL_DIMENSIONS);
+        // In the middle of another four than those that are there; a four is taken with its first number.
+        if !self.dimension.is_multiple_of(4) && (last.is_multiple_of(4) || self.dimension / 4 != last / 4) {
+            self.take_four();
+        }
+    }
+
     /// The next number, with the bits of `random` below those that the sequence has.
     #[inline]
     fn next_1d(&mut self, random: f64) -> f64 {
@@ -118,7 +142,7 @@ impl Sobol {
             return random;
         }
         if self.dimension.is_multiple_of(4) {
-            self.four = sobol_burley::sample_4d(self.index, self.dimension / 4, self.seed);
+            self.take_four();
         }
         let even = f64::from(self.four[(self.dimension % 4) as usize]);
         self.dimension += 1;
@@ -165,6 +189,25 @@ mod tests {
             let expected = f64::from(n) / 256.0;
             let chi2: f64 = cells.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
             assert!(chi2 < 400.0, "draw {k}: χ² = {chi2}");
+        }
+    }
+
+    /// To pass over numbers is to take them and not to look.
+    #[test]
+    fn numbers_can_be_passed_over() {
+        for kind in SamplerKind::ALL {
+            for before in 0..SOBOL_DIMENSIONS + 5 {
+                for skipped in 0..12 {
+                    let mut s = Sampler::of_kind(kind, 3, 1, 2, 9);
+                    (0..before).for_each(|_| _ = s.next_1d());
+                    let mut taken = s.clone();
+                    s.skip(skipped);
+                    (0..skipped).for_each(|_| _ = taken.next_1d());
+                    for _ in 0..6 {
+                        assert_eq!(s.next_1d(), taken.next_1d(), "{kind:?}: {skipped} after {before}");
+                    }
+                }
+            }
         }
     }
 

@@ -37,6 +37,8 @@ pub struct World {
     pub(crate) far_plane_clips: bool,
     /// Curved shapes and veils, if there are any.
     pub(crate) others: Option<Box<OtherShapes>>,
+    /// A box in which no boundary of a medium is met, if all lights are points in it and there are only opaque triangles.
+    pub(crate) clear: Option<Bounds>,
     /// The materials of the surfaces that are no plain Lambertian ones.
     pub(crate) materials: Vec<Shading>,
     surface_of_triangle: Vec<u32>,
@@ -199,9 +201,11 @@ impl World {
         let shapes = shapes.union(media.ambient_bounds());
         let matter = scene.sensor.origins().into_iter().fold(shapes, Bounds::with);
         let bounds = positions(scene).fold(matter, Bounds::with);
+        let lights = Lights::new(scene, reach(scene, matter.extent().length(), bounds.extent().length()));
         Self {
+            clear: clear(&media, &lights).filter(|_| others.is_none()),
             media,
-            lights: Lights::new(scene, reach(scene, matter.extent().length(), bounds.extent().length())),
+            lights,
             far_plane_clips: scene.sensor.far_clip < matter.extent().length(),
             occluder_bounds: occluder_bounds(scene, &bvh, bounds),
             bvh,
@@ -431,6 +435,14 @@ pub(crate) fn curved_lift(shape: &CurvedShape) -> f64 {
 pub(crate) fn lift(triangle: &Triangle) -> f64 {
     let [a, b, c] = triangle.vertices_f64().map(|v| v.abs());
     a.max(b).max(c).max_element() * (1.0 / 4_294_967_296.0)
+}
+
+/// A box in which no boundary is met, if all lights are points inside of it.
+fn clear(media: &Media, lights: &Lights) -> Option<Bounds> {
+    let clear = media.clear();
+    let inside = |p: DVec3| p.cmpgt(clear.min).all() && p.cmplt(clear.max).all();
+    let all_inside = lights.points().iter().all(|(_, position, _)| inside(*position));
+    (all_inside && lights.points().len() == lights.count() && lights.count() > 0).then_some(clear)
 }
 
 /// The point emitters' positions.

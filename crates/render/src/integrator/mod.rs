@@ -2,6 +2,7 @@
 
 mod chromatic;
 mod equiangular;
+mod fan;
 mod kind;
 mod lit;
 mod mixture;
@@ -11,6 +12,7 @@ mod surfaces;
 mod volpath;
 
 use glam::DVec3;
+use pulp::Arch;
 use vdf_geometry::{Hit, Segment};
 use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
@@ -32,6 +34,8 @@ pub(crate) struct Tracer<'a, R> {
     pub(crate) transmittance: TransmittanceEstimator,
     pub(crate) roulette: Roulette,
     pub(crate) estimator: Estimator,
+    /// The instruction set of vectors.
+    pub(crate) arch: Arch,
     /// Whom a long path asks whether to stop.
     pub(crate) progress: &'a dyn Progress,
 }

@@ -21,6 +21,7 @@ use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
 use super::{
     Aim, Path, PathRay, Tracer, Vertex, choose,
     equiangular::{Equiangular, LightPlace},
+    fan::Fan,
     stretch::{Stretch, distance_at_depth, stretches},
     to_f32,
 };
@@ -41,7 +42,7 @@ pub(super) struct Fog<'a> {
     pub(super) direction: DVec3,
     pub(super) intervals: &'a MediumIntervals<'a>,
     /// The optical depth of all of it, the largest of all colours, positive.
-    tau: f64,
+    pub(super) tau: f64,
     pub(super) samples: u32,
 }
 
@@ -80,7 +81,7 @@ impl<R: Recorder> Tracer<'_, R> {
                 let samples = samples.of_share(f64::from(path.throughput.max_element()) * -(-tau).exp_m1());
                 let fog = Fog { free: &free, direction: path.ray.direction, intervals: &intervals, tau, samples };
                 let light = match self.estimator {
-                    Estimator::Thesis => self.by_transmittance(&fog, sampler, counters),
+                    Estimator::Thesis => self.by_transmittance(&fog, self.fan(&fog).as_mut(), sampler, counters),
                     // Only of the opaque triangles is known where they leave a ray lit.
                     Estimator::Lit if self.world.others.is_none() => {
                         let stretches = stretches(&intervals, &self.world.media);
@@ -89,7 +90,7 @@ impl<R: Recorder> Tracer<'_, R> {
                             light += self.scattered_from_points(&fog, &stretches, sampler, counters);
                         }
                         if !lights.others().is_empty() {
-                            light += self.towards_lights(&fog, &stretches, lights.others(), sampler, counters);
+                            light += self.towards_lights(&fog, &stretches, lights.others(), None, sampler, counters);
                         }
                         light
                     }
@@ -97,6 +98,7 @@ impl<R: Recorder> Tracer<'_, R> {
                         &fog,
                         &stretches(&intervals, &self.world.media),
                         lights.all(),
+                        self.fan(&fog).as_mut(),
                         sampler,
                         counters,
                     ),
@@ -112,9 +114,15 @@ impl<R: Recorder> Tracer<'_, R> {
         path.radiance
     }
 
-    /// Emitted light scattered once into the ray, from distances drawn by transmittance.
+    /// Emitted light scattered once into the ray, from distances drawn by transmittance. With a fan the samples are taken together.
     #[inline]
-    fn by_transmittance(&self, fog: &Fog<'_>, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
+    pub(super) fn by_transmittance(
+        &self,
+        fog: &Fog<'_>,
+        mut fan: Option<&mut Fan<'_>>,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
         let &Fog { free, direction, intervals, tau, samples } = fog;
         let width = -(-tau).exp_m1() / f64::from(samples);
         let mut gathered = Gathered::default();
@@ -123,6 +131,15 @@ impl<R: Recorder> Tracer<'_, R> {
                 break;
             }
             let depth = stratum_depth(k, width, sampler.next_1d());
+            if let Some(fan) = &mut fan {
+                if let Some(t) = fan.at_depth(depth) {
+                    let emitter = fan.draw_emitter(sampler);
+                    if fan.push(t, emitter, 1.0) {
+                        self.ask_fan(fan, fog, &mut gathered.sum, counters);
+                    }
+                }
+                continue;
+            }
             // Rounding may place the last sample an ulp beyond the end; it is worth nothing there.
             if let FreeFlight::Collision { t, medium, regions } = intervals.free_flight(depth) {
                 let point = free.at(t);
@@ -135,16 +152,17 @@ impl<R: Recorder> Tracer<'_, R> {
                 }
             }
         }
-        self.ask_all(&mut gathered, counters);
+        self.ask_rest(&mut gathered, fan, fog, counters);
         gathered.sum * to_f32(width)
     }
 
-    /// Light of these emitters scattered once into the ray, from distances drawn towards one of them or by transmittance.
-    fn towards_lights(
+    /// Light of these emitters scattered once into the ray, from distances drawn towards one of them or by transmittance. With a fan the samples are taken together.
+    pub(super) fn towards_lights(
         &self,
         fog: &Fog<'_>,
         stretches: &[Stretch],
         emitters: &[usize],
+        mut fan: Option<&mut Fan<'_>>,
         sampler: &mut Sampler,
         counters: &mut Counters,
     ) -> Rgb {
@@ -190,6 +208,12 @@ impl<R: Recorder> Tracer<'_, R> {
                 continue;
             }
             let t = (distance / fog.intervals.length()).clamp(stretch.ends[0], stretch.ends[1]);
+            if let Some(fan) = &mut fan {
+                if fan.push(t, emitter, to_f32(arrives / pdf)) {
+                    self.ask_fan(fan, fog, &mut gathered.sum, counters);
+                }
+                continue;
+            }
             let point = fog.free.at(t);
             if let Some(light) = lights.seen_from(point, &place) {
                 let vertex = Vertex::InMedium { phase: stretch.phase, direction: fog.direction };
@@ -199,7 +223,7 @@ impl<R: Recorder> Tracer<'_, R> {
                 self.gather(&mut gathered, &at, |value| albedo * value * to_f32(arrives / pdf), counters);
             }
         }
-        self.ask_all(&mut gathered, counters);
+        self.ask_rest(&mut gathered, fan, fog, counters);
         // An emitter's weight is for one of all.
         gathered.sum * (emitters.len() as f32 / lights.count() as f32) / fog.samples as f32
     }
@@ -222,6 +246,14 @@ impl<R: Recorder> Tracer<'_, R> {
         gathered.waiting += 1;
         if gathered.waiting == TOGETHER {
             self.ask_all(gathered, counters);
+        }
+    }
+
+    /// Asks what waits at the end of a ray.
+    fn ask_rest(&self, gathered: &mut Gathered, fan: Option<&mut Fan<'_>>, fog: &Fog<'_>, counters: &mut Counters) {
+        match fan {
+            Some(fan) => self.ask_fan(fan, fog, &mut gathered.sum, counters),
+            None => self.ask_all(gathered, counters),
         }
     }
 

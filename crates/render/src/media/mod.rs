@@ -181,6 +181,19 @@ impl Media {
         self.regions.are_not_crossed(segment)
     }
 
+    /// A box in whose inside no boundary is met; empty where none is known.
+    #[must_use]
+    pub(crate) fn clear(&self) -> Bounds {
+        self.regions.clear()
+    }
+
+    /// How near to a boundary a place on the segment, as a parameter along it, may have rounded to the other side.
+    #[inline]
+    #[must_use]
+    pub(crate) fn doubt(&self, segment: &Segment) -> f64 {
+        self.regions.tolerance(segment)
+    }
+
     /// exp(−∫σ_t) along the segment, which starts in `start` [Houska2013, Sec. 2.1].
     #[inline]
     #[must_use]

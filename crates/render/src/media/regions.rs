@@ -189,6 +189,18 @@ impl Regions {
         !met && !self.spheres.occluded(segment)
     }
 
+    /// A box in whose inside no boundary is met: a segment between two of its points is in the same regions everywhere, which [`Regions::walk`] sees
+    /// without a look at triangles. Empty where none is known.
+    pub(super) fn clear(&self) -> Bounds {
+        if self.extents.len() > MAX_COMPARED || self.extents.iter().any(|e| !e.shell) {
+            return Bounds::EMPTY;
+        }
+        let all = Bounds::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
+        self.extents
+            .iter()
+            .fold(all, |clear, Extent { bounds, .. }| Bounds::new(clear.min.max(bounds.min), clear.max.min(bounds.max)))
+    }
+
     /// True only if a segment from `p` to `q` starts in the only region, a box in vacuum, and ends outside of it by more than the crossing
     /// tolerance. False says nothing.
     #[inline]
