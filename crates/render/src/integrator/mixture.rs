@@ -71,11 +71,7 @@ impl<R: Recorder> Tracer<'_, R> {
                 break;
             }
             let direction = path.ray.direction;
-            let (u, u_place) = (sampler.next_1d(), sampler.next_2d());
-            let (place, u) = match choose(u, lights.count()) {
-                Some((emitter, u)) => (lights.sample_point(emitter, u_place), u),
-                None => (None, u),
-            };
+            let (place, u) = self.draw_place(sampler);
             let towards = place.and_then(|place| lights.point_position(place.emitter()));
             let towards = towards.map(|position| LightPlace { position, normal: None });
             let near = |light: &LightPlace| light.passed_at(path.ray.segment.p, direction) < mean_free_path;
@@ -115,7 +111,7 @@ impl<R: Recorder> Tracer<'_, R> {
                         Some(_) => self.mixture(surface.point, &vertex, mean_free_path, u),
                         None => Mixture::NONE,
                     };
-                    let place = self.place_for_surface(sampler);
+                    let (place, _) = self.draw_place(sampler);
                     path.radiance += path.throughput
                         * self.light_from(
                             surface.point,
@@ -187,12 +183,17 @@ impl<R: Recorder> Tracer<'_, R> {
         Event::Collision { point: free.at(t), medium: stretch.medium, regions }
     }
 
-    /// The place on an emitter that a surface asks for.
+    /// A place on an emitter, each equally likely, and what is left of the number that chose the emitter: uniform. Takes three numbers in any case.
     #[inline]
-    fn place_for_surface(&self, sampler: &mut Sampler) -> Option<EmitterPoint> {
-        let (u, u_place) = (sampler.next_1d(), sampler.next_2d());
-        let (emitter, _) = choose(u, self.world.lights.count())?;
-        self.world.lights.sample_point(emitter, u_place)
+    fn draw_place(&self, sampler: &mut Sampler) -> (Option<EmitterPoint>, f64) {
+        let lights = &self.world.lights;
+        let u = sampler.next_1d();
+        let chosen = choose(u, lights.count());
+        let Some((emitter, u)) = chosen.filter(|(emitter, _)| lights.point_position(*emitter).is_none()) else {
+            sampler.skip(2);
+            return chosen.map_or((None, u), |(emitter, u)| (lights.sample_point(emitter, [0.0; 2]), u));
+        };
+        (lights.sample_point(emitter, sampler.next_2d()), u)
     }
 
     /// Next-event estimation to this place, by the power heuristic against directions that are drawn from `mixture`.
