@@ -10,6 +10,7 @@ mod grid;
 mod heterogeneous;
 mod homogeneous;
 mod intervals;
+mod region_set;
 mod regions;
 mod shells;
 #[cfg(test)]
@@ -25,7 +26,7 @@ use vdf_scene::{Boundary, Medium, MediumId, Phase, Rgb, Scene};
 pub use self::{
     homogeneous::Homogeneous,
     intervals::{MediumInterval, MediumIntervals},
-    regions::RegionSet,
+    region_set::RegionSet,
 };
 
 use self::{heterogeneous::Heterogeneous, intervals::DepthLeft, regions::Regions};

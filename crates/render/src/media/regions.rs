@@ -27,39 +27,7 @@ use smallvec::SmallVec;
 use vdf_geometry::{Bounds, Bvh, CurvedSet, Segment, Triangle};
 use vdf_scene::{Boundary, Medium, MediumId};
 
-use super::{MediumInterval, extent::Extent, shells::shells};
-
-/// The regions that a point is inside of, the innermost first.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub struct RegionSet(SmallVec<[u32; 4]>);
-
-impl Clone for RegionSet {
-    /// As a slice: once for each event of a path, and quicker than item by item.
-    #[inline]
-    fn clone(&self) -> Self {
-        Self(SmallVec::from_slice(&self.0))
-    }
-}
-
-impl RegionSet {
-    fn set(&mut self, region: u32, inside: bool) {
-        match (self.0.binary_search(&region), inside) {
-            (Err(place), true) => self.0.insert(place, region),
-            (Ok(place), false) => drop(self.0.remove(place)),
-            _ => {}
-        }
-    }
-
-    /// True outside of all regions.
-    #[inline]
-    pub(crate) fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    fn contains(&self, region: u32) -> bool {
-        self.0.contains(&region)
-    }
-}
+use super::{MediumInterval, RegionSet, extent::Extent, shells::shells};
 
 /// More boundaries than these are not looked at one by one.
 const MAX_COMPARED: usize = 8;
@@ -159,18 +127,18 @@ impl Regions {
     /// The medium of a point in these regions; `None` is vacuum.
     #[inline]
     pub(super) fn medium(&self, regions: &RegionSet) -> Option<MediumId> {
-        regions.0.first().map_or(self.ambient, |&innermost| self.inner[innermost as usize])
+        regions.innermost().map_or(self.ambient, |region| self.inner[region as usize])
     }
 
     /// The medium that the outermost of these regions has outside, by its boundary.
     pub(super) fn around(&self, regions: &RegionSet) -> Option<MediumId> {
-        regions.0.last().and_then(|&outermost| self.outer[outermost as usize])
+        regions.outermost().and_then(|region| self.outer[region as usize])
     }
 
     /// The regions that `point` is inside of. Cost: that of all triangles whose boundary's bounds hold the point.
     pub(super) fn at(&self, point: DVec3) -> RegionSet {
         let inside = (0..).zip(&self.extents).filter(|(r, e)| e.bounds.contains(point) && self.winds_about(*r, point));
-        RegionSet(inside.map(|(region, _)| region).collect())
+        inside.map(|(region, _)| region).collect()
     }
 
     /// True if the segment crosses no boundary, so that its ends are in the same regions.
