@@ -128,7 +128,7 @@ impl<'a> Ids<'a> {
         self.by_name.get(id).copied().ok_or_else(|| {
             let mut known: Vec<&str> = self.by_name.keys().copied().collect();
             known.sort_unstable();
-            user.at.error(format!("no object has the id \"{id}\""), names::suggest(id, &known))
+            user.at.error(format!("no object has the id \"{id}\""), names::suggest_defined(id, &known))
         })
     }
 

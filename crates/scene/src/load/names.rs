@@ -60,6 +60,15 @@ const MAX_LISTED: usize = 40;
 
 /// "did you mean …? supported: …", for a name that is none of `known`.
 pub(super) fn suggest(name: &str, known: &[&str]) -> String {
+    suggest_of("supported", name, known)
+}
+
+/// "did you mean …? defined: …", for a name that the file or the caller gives.
+pub(super) fn suggest_defined(name: &str, known: &[&str]) -> String {
+    suggest_of("defined", name, known)
+}
+
+fn suggest_of(what: &str, name: &str, known: &[&str]) -> String {
     let mut help = String::new();
     let comparable = |name: &str| name.len() <= MAX_COMPARED_LENGTH;
     let nearest = known
@@ -74,11 +83,10 @@ pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     match known {
         [] => help.push_str("there is none here"),
         _ if known.len() <= MAX_LISTED => {
-            let _ = write!(help, "supported: {}", known.join(", "));
+            let _ = write!(help, "{what}: {}", known.join(", "));
         }
         _ => {
-            let _ =
-                write!(help, "supported: {}, and {} more", known[..MAX_LISTED].join(", "), known.len() - MAX_LISTED);
+            let _ = write!(help, "{what}: {}, and {} more", known[..MAX_LISTED].join(", "), known.len() - MAX_LISTED);
         }
     }
     help

@@ -86,7 +86,7 @@ impl Parameters {
                     format!("the parameter \"${wanted}\" is not defined"),
                     format!(
                         "put <default name=\"{wanted}\" value=\"…\"/> before its use, or define it when you load the scene; {}",
-                        names::suggest(wanted, &known)
+                        names::suggest_defined(wanted, &known)
                     ),
                 ));
             };
@@ -128,7 +128,7 @@ impl Parameters {
         Err(SceneError::Define {
             name: name.clone(),
             message: format!("the scene does not use ${name}"),
-            help: names::suggest(name, &used),
+            help: names::suggest_defined(name, &used),
         })
     }
 }
