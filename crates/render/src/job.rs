@@ -151,9 +151,14 @@ impl std::fmt::Debug for PathTracer<'_> {
 }
 
 impl PathTracer<'_> {
+    /// The random numbers of a sample.
+    fn numbers(&self, x: u32, y: u32, sample: u32) -> Sampler {
+        Sampler::of_kind(self.sampler, self.seed, x, y, sample).even_up_to(self.integrator.even_dimensions())
+    }
+
     /// What the camera ray of a sample meets first.
     pub(crate) fn feature(&self, x: u32, y: u32, sample: u32) -> Option<Feature> {
-        let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
+        let mut sampler = self.numbers(x, y, sample);
         let FilterSample { offset: [dx, dy], .. } = self.filter.sample(&mut sampler);
         let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, &mut sampler);
         let hit = self.tracer.world.bvh.intersect(&ray.segment);
@@ -175,7 +180,7 @@ impl PathTracer<'_> {
 
     /// The radiance of one path, sample number `sample` of pixel (`x`, `y`) of the full film, and its weight in the pixel.
     pub fn sample(&self, x: u32, y: u32, sample: u32, counters: &mut Counters) -> (Rgb, f64) {
-        let mut sampler = Sampler::of_kind(self.sampler, self.seed, x, y, sample);
+        let mut sampler = self.numbers(x, y, sample);
         let FilterSample { offset: [dx, dy], weight } = self.filter.sample(&mut sampler);
         let ray = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, &mut sampler);
         let radiance = match &self.recording {

@@ -47,6 +47,8 @@ struct Sobol {
     index: u32,
     seed: u32,
     dimension: u32,
+    /// So many are even, at most [`SOBOL_DIMENSIONS`].
+    even: u32,
     /// The four dimensions that this one is among.
     four: [f32; 4],
 }
@@ -84,10 +86,19 @@ impl Sampler {
             SamplerKind::Sobol => {
                 let pixel = mix((u64::from(y) << 32) | u64::from(x), seed ^ WEYL);
                 let seed = mix(pixel.wrapping_add(u64::from(sample >> 16)), seed) as u32;
-                Some(Sobol { index: sample & 0xffff, seed, dimension: 0, four: [0.0; 4] })
+                Some(Sobol { index: sample & 0xffff, seed, dimension: 0, even: SOBOL_DIMENSIONS, four: [0.0; 4] })
             }
         };
         Self { sobol, ..Self::new(seed, x, y, sample) }
+    }
+
+    /// The same numbers, but for those after the first `dimensions`, a multiple of four: they are independent in any case.
+    #[must_use]
+    pub(crate) fn even_up_to(mut self, dimensions: u32) -> Self {
+        if let Some(sobol) = &mut self.sobol {
+            sobol.even = dimensions.min(SOBOL_DIMENSIONS);
+        }
+        self
     }
 
     /// Uniform in [0, 1), a multiple of 2⁻⁵³.
@@ -127,7 +138,7 @@ impl Sobol {
     #[inline]
     fn skip(&mut self, numbers: u32) {
         let last = self.dimension;
-        self.dimension = (last + numbers).min(SOBOL_DIMENSIONS);
+        self.dimension = (last + numbers).min(self.even);
         // In the middle of another four than those that are there; a four is taken with its first number.
         if !self.dimension.is_multiple_of(4) && (last.is_multiple_of(4) || self.dimension / 4 != last / 4) {
             self.take_four();
@@ -138,7 +149,7 @@ impl Sobol {
     #[inline]
     fn next_1d(&mut self, random: f64) -> f64 {
         const STEP: f64 = 1.0 / 8_388_608.0;
-        if self.dimension == SOBOL_DIMENSIONS {
+        if self.dimension == self.even {
             return random;
         }
         if self.dimension.is_multiple_of(4) {
@@ -198,7 +209,7 @@ mod tests {
         for kind in SamplerKind::ALL {
             for before in 0..SOBOL_DIMENSIONS + 5 {
                 for skipped in 0..12 {
-                    let mut s = Sampler::of_kind(kind, 3, 1, 2, 9);
+                    let mut s = Sampler::of_kind(kind, 3, 1, 2, 9).even_up_to(if skipped % 2 == 0 { 12 } else { 64 });
                     (0..before).for_each(|_| _ = s.next_1d());
                     let mut taken = s.clone();
                     s.skip(skipped);
@@ -209,6 +220,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Numbers are those of the sequence up to a dimension, and independent ones after it.
+    #[test]
+    fn numbers_are_even_up_to_a_dimension() {
+        let take = |mut s: Sampler| -> Vec<f64> { (0..20).map(|_| s.next_1d()).collect() };
+        let [few, all, none] = [(SamplerKind::Sobol, 12), (SamplerKind::Sobol, 64), (SamplerKind::Independent, 12)]
+            .map(|(kind, even)| take(Sampler::of_kind(kind, 3, 1, 2, 9).even_up_to(even)));
+        assert_eq!(few[..12], all[..12]);
+        assert_eq!(few[12..], none[12..]);
+        assert!((0..12).all(|i| all[i] != none[i]));
     }
 
     #[test]

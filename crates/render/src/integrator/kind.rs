@@ -97,6 +97,16 @@ impl Integrator {
         }
     }
 
+    /// So many of a path's first random numbers are worth being even: those of the pixel and of one event and a half, for path tracing, whose light
+    /// comes from many; more take time and no noise away (`docs/performance.md`).
+    #[must_use]
+    pub(crate) const fn even_dimensions(self) -> u32 {
+        match self {
+            Self::Volpath => 12,
+            Self::Raymarch(_) => 64,
+        }
+    }
+
     /// The samples on each path segment, if it takes any.
     #[must_use]
     pub const fn samples_per_segment(self) -> Option<SegmentSamples> {

@@ -1,6 +1,6 @@
 //! `volpath` with the estimator `equiangular`: the paths of `volpath.rs`, drawn so that they come near the lights.
 //!
-//! *Distances.* A ray that passes a point light within a mean free path, of the thinnest medium, is drawn by a mixture: a share of
+//! *Distances.* A ray that passes a point light within a mean free path of the thinnest medium, and a tenth of the scene's diagonal, is drawn by a mixture: a share of
 //! β(1 − T) of such rays, T their transmittance, ends in a collision whose distance is drawn by its angle at the light
 //! (`equiangular`); the others fly freely. The density of a collision is that of the mixture, so its weight is at most
 //! 1/(1 − β); a ray that arrives at its end is worth 1/(1 − β(1 − T)). Rays that come no nearer fly freely: r² hardly changes along
@@ -37,6 +37,9 @@ use crate::{
     PhaseFunction as _, RegionSet, Sampler, bsdf::sample_diffuse, frame::direction_about, lights::EmitterPoint,
 };
 
+/// Rays that pass a light at more than this share of the scene's diagonal fly freely: what they would gain does not make up for its time (`docs/performance.md`).
+const NEAR: f64 = 0.1;
+
 /// β, of the rays that collide the share whose distances are drawn towards a light.
 const DISTANCES: f64 = 0.3;
 
@@ -64,6 +67,7 @@ impl<R: Recorder> Tracer<'_, R> {
     pub(crate) fn volpath_by_mixture(&self, ray: PathRay, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let (media, lights) = (&self.world.media, &self.world.lights);
         let mean_free_path = media.least_sigma_t().recip();
+        let near_enough = mean_free_path.min(NEAR * self.world.bounds.extent().length());
         let mut path = Path::new(ray);
         while self.goes_on(&mut path, sampler) {
             let is_last = !self.may_scatter(path.depth + 1);
@@ -74,7 +78,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let (place, u) = self.draw_place(sampler);
             let towards = place.and_then(|place| lights.point_position(place.emitter()));
             let towards = towards.map(|position| LightPlace { position, normal: None });
-            let near = |light: &LightPlace| light.passed_at(path.ray.segment.p, direction) < mean_free_path;
+            let near = |light: &LightPlace| light.passed_at(path.ray.segment.p, direction) < near_enough;
             let event = match towards.filter(near) {
                 _ if is_last => self.arrival(&mut path, counters),
                 Some(light) => self.event_near_light(&mut path, &light, u, counters),
@@ -181,19 +185,6 @@ impl<R: Recorder> Tracer<'_, R> {
         let regions = intervals.regions_in(stretch.part, t);
         self.crosses_to(path, &regions);
         Event::Collision { point: free.at(t), medium: stretch.medium, regions }
-    }
-
-    /// A place on an emitter, each equally likely, and what is left of the number that chose the emitter: uniform. Takes three numbers in any case.
-    #[inline]
-    fn draw_place(&self, sampler: &mut Sampler) -> (Option<EmitterPoint>, f64) {
-        let lights = &self.world.lights;
-        let u = sampler.next_1d();
-        let chosen = choose(u, lights.count());
-        let Some((emitter, u)) = chosen.filter(|(emitter, _)| lights.point_position(*emitter).is_none()) else {
-            sampler.skip(2);
-            return chosen.map_or((None, u), |(emitter, u)| (lights.sample_point(emitter, [0.0; 2]), u));
-        };
-        (lights.sample_point(emitter, sampler.next_2d()), u)
     }
 
     /// Next-event estimation to this place, by the power heuristic against directions that are drawn from `mixture`.

@@ -23,6 +23,7 @@ use crate::{
     CameraRay, Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler,
     TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
+    lights::EmitterPoint,
     world::{ShadingPoint, SurfacePoint, World},
 };
 
@@ -291,10 +292,23 @@ impl<R: Recorder> Tracer<'_, R> {
     /// A sample of an emitter, as seen from `point`, and what [`Tracer::flight_to_emitter`] draws.
     #[inline]
     fn draw_emitter(&self, point: DVec3, sampler: &mut Sampler) -> (Option<LightSample>, Option<f64>) {
-        let (u_emitter, u) = (sampler.next_1d(), sampler.next_2d());
+        let (place, _) = self.draw_place(sampler);
         // Drawn even if no one will ask for it: how many numbers an event takes depends on nothing.
         let flight = self.flight_to_emitter(sampler);
-        (self.world.lights.sample(point, u_emitter, u), flight)
+        (place.and_then(|place| self.world.lights.seen_from(point, &place)), flight)
+    }
+
+    /// A place on an emitter, each equally likely, and what is left of the number that chose the emitter: uniform. Takes three numbers in any case.
+    #[inline]
+    fn draw_place(&self, sampler: &mut Sampler) -> (Option<EmitterPoint>, f64) {
+        let lights = &self.world.lights;
+        let u = sampler.next_1d();
+        let chosen = choose(u, lights.count());
+        let Some((emitter, u)) = chosen.filter(|(emitter, _)| lights.point_position(*emitter).is_none()) else {
+            sampler.skip(2);
+            return chosen.map_or((None, u), |(emitter, u)| (lights.sample_point(emitter, [0.0; 2]), u));
+        };
+        (lights.sample_point(emitter, sampler.next_2d()), u)
     }
 
     /// The query that a sample of an emitter depends on, and the light that arrives if it is unoccluded; `None` if that is nothing anyway. For vertices in a medium, with
