@@ -33,7 +33,7 @@ pub enum QueryKind {
 
 /// Hears every query that is asked, with its answer.
 pub trait Recorder {
-    /// A query is about to be asked.
+    /// A query is about to be asked, or several together.
     #[inline(always)]
     fn begins(&self) {}
 
@@ -142,6 +142,7 @@ impl<R: Recorder> Visibility<'_, R> {
         let mut answers = [Answer::Unknown; BATCH];
         for (queries, unoccluded) in queries.chunks(BATCH).zip(unoccluded.chunks_mut(BATCH)) {
             let answers = &mut answers[..queries.len()];
+            self.recorder.begins();
             self.provers.answer_all(queries, answers);
             counters.count_all(queries, answers);
             let mut unknown = false;
