@@ -369,6 +369,34 @@ mod tests {
         assert!(lit > 5000, "{lit}");
     }
 
+    /// A sample that lies beside the box in which no boundary is met, though the ray does not touch it: the light is in denser fog of its own.
+    #[test]
+    fn light_from_another_medium_is_taken_by_itself() {
+        let mut scene = scene("cbox_vol2", Phase::Isotropic, &[]);
+        let light = scene.emitters.iter().find_map(Emitter::position).expect("a point").as_vec3();
+        let (mut medium, mut boundary) = (scene.media[0].clone(), scene.boundaries[0].clone());
+        medium.sigma_t = vdf_scene::Extinction::Constant(DVec3::splat(0.02));
+        boundary.triangles.iter_mut().for_each(|t| t.vertices = t.vertices.map(|v| light + (v - light) * 0.1));
+        boundary.interior = Some(vdf_scene::MediumId(1));
+        scene.media.push(medium);
+        scene.boundaries.push(boundary);
+        let prepared =
+            PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).expect("it is prepared");
+        let (world, tracer) = (prepared.world(), tracer(&prepared, Arch::new()));
+        let free = Segment::new(dvec3(400.0, 100.0, 100.0), dvec3(450.0, 400.0, 300.0));
+        let intervals = world.media.intervals(&free, &world.media.regions_at(free.p));
+        let (tau, direction) = (intervals.optical_depth(), (free.q - free.p).normalize());
+        let fog = Fog { free: &free, direction, intervals: &intervals, tau, samples: 20 };
+        let [together, apart] = [true, false].map(|together| {
+            let mut fan = tracer.fan(&fog).filter(|_| together);
+            assert_eq!(fan.is_some(), together);
+            let mut counters = Counters::default();
+            tracer.by_transmittance(&fog, fan.as_mut(), &mut Sampler::new(3, 1, 2, 4), &mut counters)
+        });
+        assert!(apart.max_element() > 0.0);
+        assert_eq!(together, apart);
+    }
+
     /// No fan where light passes a boundary, or is no point.
     #[test]
     fn a_fan_is_for_the_usual_case() {
