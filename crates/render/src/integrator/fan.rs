@@ -17,7 +17,7 @@ use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
 use super::{Aim, Tracer, Vertex, raymarch::Fog, to_f32};
 use crate::{
     PhaseFunction as _, Sampler, TransmittanceEstimator,
-    lights::Lights,
+    lights::{Lights, choose},
     media::{Homogeneous, Substance},
     phase::pdf_lobe,
 };
@@ -101,16 +101,14 @@ impl<'a> Fan<'a> {
 
     /// An emitter, each equally likely. Takes as many numbers as an emitter and a place on it.
     #[inline]
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
     pub(super) fn draw_emitter(&self, sampler: &mut Sampler) -> usize {
-        let n = self.lights.count();
-        if n == 1 {
+        if self.lights.count() == 1 {
             sampler.skip(3);
             return 0;
         }
-        let u = sampler.next_1d();
+        let chosen = choose(sampler.next_1d(), self.lights.count());
         sampler.skip(2);
-        ((u * n as f64) as usize).min(n - 1)
+        chosen.map_or(0, |(emitter, _)| emitter)
     }
 
     /// Adds a sample; true if no more have room.
@@ -395,6 +393,53 @@ mod tests {
         });
         assert!(apart.max_element() > 0.0);
         assert_eq!(together, apart);
+    }
+
+    /// A ray from fog into a hole in it, where the light is: the rounded place of a sample at the end of the fog may be in the hole, where nothing takes light away.
+    #[test]
+    fn a_sample_at_a_boundary_is_where_its_place_is() {
+        let mut scene = scene("cbox_vol2", Phase::Isotropic, &[]);
+        let light = scene.emitters.iter().find_map(Emitter::position).expect("a point").as_vec3();
+        scene.media[0].sigma_t = vdf_scene::Extinction::Constant(DVec3::splat(0.02));
+        let mut hole = scene.boundaries[0].clone();
+        hole.triangles.iter_mut().for_each(|t| t.vertices = t.vertices.map(|v| light + (v - light) * 0.3));
+        (hole.interior, hole.exterior) = (None, Some(vdf_scene::MediumId(0)));
+        scene.boundaries.push(hole);
+        let prepared =
+            PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).expect("it is prepared");
+        let (world, tracer) = (prepared.world(), tracer(&prepared, Arch::new()));
+        let clear = world.clear.expect("the hole");
+        let mut crossed = 0;
+        for i in 0..4000 {
+            let s = &mut Sampler::new(29, i, 0, 0);
+            let mut inside = || clear.min + (clear.max - clear.min) * DVec3::from_array([(); 3].map(|()| s.next_1d()));
+            let (q, r) = (inside(), inside());
+            let free = Segment::new(q + (q - r).normalize_or_zero() * 300.0, q);
+            let start = world.media.regions_at(free.p);
+            if start == world.media.regions_at(q) {
+                continue;
+            }
+            let intervals = world.media.intervals(&free, &start);
+            let (tau, direction) = (intervals.optical_depth(), (free.q - free.p).normalize());
+            let fog = Fog { free: &free, direction, intervals: &intervals, tau, samples: 3 };
+            let Some(mut fan) = tracer.fan(&fog) else { continue };
+            let t = fan.ends[1].next_down();
+            let point = free.at(t);
+            crossed += u32::from(point.cmpgt(clear.min).all() && point.cmplt(clear.max).all());
+            fan.push(t, 0, 1.0);
+            let (mut sum, counters) = (Rgb::ZERO, &mut Counters::default());
+            tracer.ask_fan(&mut fan, &fog, &mut sum, counters);
+            let place = world.lights.sample_point(0, [0.0; 2]).expect("a point");
+            let sample = world.lights.seen_from(point, &place).expect("it shines there");
+            let (phase, regions) = (Phase::Isotropic, intervals.regions_in(fan.part, t));
+            let vertex = Vertex::InMedium { phase, direction };
+            let aim = Aim { point, vertex: &vertex, regions: &regions, light: &sample, flight: None };
+            let (query, value) = tracer.aim(&aim).expect("it is lit if nothing is in the way");
+            let expected =
+                if tracer.visibility.unoccluded(&query, counters) { fan.medium.albedo * value } else { Rgb::ZERO };
+            assert_eq!(sum, expected, "ray {i}, {free:?}");
+        }
+        assert!(crossed > 20, "{crossed}");
     }
 
     /// No fan where light passes a boundary, or is no point.

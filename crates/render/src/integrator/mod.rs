@@ -23,7 +23,7 @@ use crate::{
     CameraRay, Estimator, LightSample, PhaseFunction as _, Progress, RegionSet, Roulette, Sampler,
     TransmittanceEstimator,
     bsdf::{eval_diffuse, sample_diffuse},
-    lights::EmitterPoint,
+    lights::{EmitterPoint, choose},
     world::{ShadingPoint, SurfacePoint, World},
 };
 
@@ -441,15 +441,6 @@ impl Vertex<'_> {
             Self::OnMaterial(_, shading) => surfaces::eval(world, shading, to),
         }
     }
-}
-
-/// One of so many, each equally likely, by a uniform number, and what is left of it: uniform again.
-#[inline]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
-fn choose(u: f64, n: usize) -> Option<(usize, f64)> {
-    let u = u * n as f64;
-    let i = (u as usize).min(n.checked_sub(1)?);
-    Some((i, (u - i as f64).clamp(0.0, 1.0 - f64::EPSILON / 2.0)))
 }
 
 /// The optical depth of a free flight: it reaches τ with probability exp(−τ).

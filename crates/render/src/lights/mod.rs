@@ -87,6 +87,15 @@ impl EmitterPoint {
     }
 }
 
+/// One of so many, each equally likely, by a uniform number, and what is left of it: uniform again.
+#[inline]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
+pub(crate) fn choose(u: f64, n: usize) -> Option<(usize, f64)> {
+    let u = u * n as f64;
+    let i = (u as usize).min(n.checked_sub(1)?);
+    Some((i, (u - i as f64).clamp(0.0, 1.0 - f64::EPSILON / 2.0)))
+}
+
 impl Lights {
     /// Prepares the emitters of `scene`. `reach` is longer than any path through the scene, in world units.
     #[must_use]
@@ -158,9 +167,7 @@ impl Lights {
     #[inline]
     #[must_use]
     pub fn sample(&self, from: DVec3, u_emitter: f64, u: [f64; 2]) -> Option<LightSample> {
-        let n = self.lights.len();
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, n)")]
-        let emitter = ((u_emitter * n as f64) as usize).min(n.checked_sub(1)?);
+        let (emitter, _) = choose(u_emitter, self.lights.len())?;
         self.seen_from(from, &self.sample_point(emitter, u)?)
     }
 
