@@ -125,3 +125,32 @@ fn batches_are_answered_as_single_queries() {
         }
     }
 }
+
+#[derive(Default)]
+struct Listener {
+    began: std::cell::Cell<u32>,
+    heard: std::cell::Cell<u32>,
+}
+
+impl Recorder for Listener {
+    fn begins(&self) {
+        self.began.set(self.began.get() + 1);
+    }
+
+    fn record(&self, _: &ShadowQuery, _: bool) {
+        assert!(self.began.get() > 0, "nobody said that a query is about to be asked");
+        self.heard.set(self.heard.get() + 1);
+    }
+}
+
+/// Who listens hears that queries are about to be asked, once for a batch, and then of each.
+#[test]
+fn a_listener_hears_that_queries_begin() {
+    let (bvh, provers, listener) = (Bvh::new(&[]), Provers::none(), Listener::default());
+    let visibility = Visibility::new(&bvh, &provers).recorded(&listener as &dyn Recorder);
+    let query = ShadowQuery { from: DVec3::ZERO, to: DVec3::ONE, emitter: 0, kind: QueryKind::Spatial };
+    visibility.all_unoccluded(&[query; 300], &mut [false; 300], &mut Counters::default());
+    assert_eq!((listener.began.take(), listener.heard.take()), (2, 300));
+    assert!(visibility.unoccluded(&query, &mut Counters::default()));
+    assert_eq!((listener.began.get(), listener.heard.get()), (1, 1));
+}
