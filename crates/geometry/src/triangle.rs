@@ -20,12 +20,16 @@ impl Triangle {
     }
 
     /// The vertices in double precision; the conversion is exact.
+    #[inline]
     #[must_use]
     pub fn vertices_f64(&self) -> [DVec3; 3] {
-        self.vertices.map(|v| v.as_dvec3())
+        // Not by `map`, which is a call.
+        let [a, b, c] = self.vertices;
+        [a.as_dvec3(), b.as_dvec3(), c.as_dvec3()]
     }
 
     /// The cross product of two edges: twice the area times the normal; zero for a degenerate triangle.
+    #[inline]
     #[must_use]
     pub fn area_normal(&self) -> DVec3 {
         let [a, b, c] = self.vertices_f64();

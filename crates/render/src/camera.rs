@@ -4,6 +4,8 @@ use glam::{DVec3, dvec3};
 use vdf_geometry::Segment;
 use vdf_scene::{FilmSettings, Lens, Projection, Sensor};
 
+use crate::frame::sin_cos_of_turn;
+
 /// A camera and its film, prepared for rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
@@ -61,7 +63,7 @@ impl Camera {
     #[must_use]
     pub fn ray_through(&self, lens: &Lens, x: f64, y: f64, reach: f64, [u0, u1]: [f64; 2]) -> CameraRay {
         let (_, through) = self.through(x, y);
-        let (radius, (sin, cos)) = (lens.radius * u0.sqrt(), (std::f64::consts::TAU * u1).sin_cos());
+        let (radius, (sin, cos)) = (lens.radius * u0.sqrt(), sin_cos_of_turn(u1));
         let on_lens = dvec3(radius * cos, radius * sin, 0.0);
         self.between_planes(on_lens, (through * lens.focus_distance - on_lens) / lens.focus_distance, reach)
     }

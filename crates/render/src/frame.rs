@@ -3,15 +3,53 @@
 //! Cosine and sine of the polar angle are both computed from the random number. √(1 − cos²θ) would lose half the digits
 //! of a small angle.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
-/// The unit direction at the polar angle with these cosine and sine to the unit vector `axis`, with azimuth `phi`.
+/// The sine and the cosine of 2πu, u in [0, 1].
+///
+/// By Taylor polynomials on an eighth of a turn to either side of a quarter, where what they leave out is below 2⁻⁵⁴; with rounding the error is below 2⁻⁵².
+/// A third of the time that a library takes, which has to reduce any angle, and the same bits on all machines.
 #[inline]
-pub(crate) fn direction_about(axis: DVec3, cos_theta: f64, sin_theta: f64, phi: f64) -> DVec3 {
+#[allow(clippy::cast_possible_truncation, reason = "0 to 4")]
+pub(crate) fn sin_cos_of_turn(u: f64) -> (f64, f64) {
+    /// 1/3!, 1/5!, … with their signs; and 1/2!, 1/4!, …
+    const SIN: [f64; 7] = [
+        -1.0 / 6.0,
+        1.0 / 120.0,
+        -1.0 / 5040.0,
+        1.0 / 362_880.0,
+        -1.0 / 39_916_800.0,
+        1.0 / 6_227_020_800.0,
+        -1.0 / 1_307_674_368_000.0,
+    ];
+    const COS: [f64; 8] = [
+        -0.5,
+        1.0 / 24.0,
+        -1.0 / 720.0,
+        1.0 / 40_320.0,
+        -1.0 / 3_628_800.0,
+        1.0 / 479_001_600.0,
+        -1.0 / 87_178_291_200.0,
+        1.0 / 20_922_789_888_000.0,
+    ];
+    let quarters = 4.0 * u;
+    let nearest = (quarters + 0.5) as i32;
+    // The difference is exact.
+    let x = (quarters - f64::from(nearest)) * FRAC_PI_2;
+    let xx = x * x;
+    let series = |c: &[f64]| c.iter().rev().fold(0.0, |sum, c| sum * xx + c);
+    let (sin, cos) = (x + x * (xx * series(&SIN)), 1.0 + xx * series(&COS));
+    let (sin, cos) = if nearest & 1 == 0 { (sin, cos) } else { (cos, -sin) };
+    if nearest & 2 == 0 { (sin, cos) } else { (-sin, -cos) }
+}
+
+/// The unit direction at the polar angle with these cosine and sine to the unit vector `axis`, with azimuth 2π`turn`.
+#[inline]
+pub(crate) fn direction_about(axis: DVec3, cos_theta: f64, sin_theta: f64, turn: f64) -> DVec3 {
     let (s, t) = axis.any_orthonormal_pair();
-    let (sin_phi, cos_phi) = phi.sin_cos();
+    let (sin_phi, cos_phi) = sin_cos_of_turn(turn);
     (s * (sin_theta * cos_phi) + t * (sin_theta * sin_phi) + axis * cos_theta).normalize()
 }
 
@@ -19,13 +57,13 @@ pub(crate) fn direction_about(axis: DVec3, cos_theta: f64, sin_theta: f64, phi: 
 #[inline]
 pub(crate) fn sample_cosine_hemisphere(normal: DVec3, [u0, u1]: [f64; 2]) -> (DVec3, f64) {
     let cos_theta = (1.0 - u0).sqrt();
-    (direction_about(normal, cos_theta, u0.sqrt(), TAU * u1), cos_theta / PI)
+    (direction_about(normal, cos_theta, u0.sqrt(), u1), cos_theta / PI)
 }
 
 /// A uniform direction about `axis`; its density is 1/4π.
 #[inline]
 pub(crate) fn sample_sphere_about(axis: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
-    direction_about(axis, 2.0 * u0 - 1.0, 2.0 * (u0 * (1.0 - u0)).sqrt(), TAU * u1)
+    direction_about(axis, 2.0 * u0 - 1.0, 2.0 * (u0 * (1.0 - u0)).sqrt(), u1)
 }
 
 /// A uniform direction of the sphere; its density is 1/4π.
@@ -36,8 +74,25 @@ pub(crate) fn sample_uniform_sphere(u: [f64; 2]) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::{Sampler, chi_squared::assert_drawn_from};
+
+    /// Beside the library, over the turn and close to its quarters. The angle that the library gets is rounded itself, by 2⁻⁵¹ at most.
+    #[test]
+    fn sines_and_cosines_are_those_of_the_library() {
+        let near = |x: f64| [x.next_down(), x, x.next_up(), x + 1e-9];
+        let quarters = (0..=8).flat_map(|i| near(f64::from(i) / 8.0)).filter(|u| (0.0..=1.0).contains(u));
+        for u in (0..100_000).map(|i| (f64::from(i) + 0.3) / 1e5).chain(quarters) {
+            let (sin, cos) = sin_cos_of_turn(u);
+            let (s, c) = (TAU * u).sin_cos();
+            assert!((sin - s).abs() < 8e-16 && (cos - c).abs() < 8e-16, "{u}: {sin} {s}, {cos} {c}");
+            assert!((sin.hypot(cos) - 1.0).abs() < 4e-16, "{u}");
+        }
+        assert_eq!(sin_cos_of_turn(0.0), (0.0, 1.0));
+        assert_eq!(sin_cos_of_turn(0.5).1, -1.0);
+    }
 
     const LAST: f64 = 1.0 - f64::EPSILON / 2.0;
 

@@ -3,7 +3,7 @@
 //! `wo` is the direction of propagation before the event, `wi` the direction after it; both are unit vectors. (Mitsuba's
 //! `wi` points back along the ray, hence the other sign of the cosine there.)
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::DVec3;
 
@@ -50,7 +50,7 @@ impl PhaseFunction for Phase {
                 let half = 4.0 * u0 - 2.0;
                 let large = (half.abs() + (half * half + 1.0).sqrt()).cbrt();
                 let cos_theta = ((large - large.recip()) * half.signum()).clamp(-1.0, 1.0);
-                direction_about(from, cos_theta, ((1.0 - cos_theta) * (1.0 + cos_theta)).sqrt(), TAU * u1)
+                direction_about(from, cos_theta, ((1.0 - cos_theta) * (1.0 + cos_theta)).sqrt(), u1)
             }
             Self::TwoLobes { weight, g } => {
                 // What is left of the number that chose the lobe is uniform again; rounding must not make it 1.
@@ -84,11 +84,13 @@ fn sample_lobe(g: f64, from: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
     let near = 2.0 * narrow * narrow * ((1.0 - v) * (1.0 + a * v));
     let far = 2.0 * wide * wide * (v * ((1.0 - a) + a * v));
     let cos_theta = if g >= 0.0 { 1.0 - near } else { near - 1.0 };
-    direction_about(from, cos_theta, (near * far).sqrt(), TAU * u1)
+    direction_about(from, cos_theta, (near * far).sqrt(), u1)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::{Sampler, chi_squared::assert_drawn_from};
 

@@ -4,10 +4,12 @@
 //! dense as those of the GGX with the same α, so that weights stay bounded, and density and samples match exactly; a sampler of its own would need
 //! an inversion by iteration.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
 use vdf_scene::Microfacets;
+
+use crate::frame::sin_cos_of_turn;
 
 /// The distribution at a point of a surface; z is the normal.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +73,7 @@ impl Facets {
         let across = dvec3(-stretched.y, stretched.x, 0.0).try_normalize().unwrap_or(DVec3::X);
         let third = stretched.cross(across);
         // A point of the projected hemisphere: a disk, of which one half is shortened.
-        let (r, (sin, cos)) = (u0.sqrt(), (TAU * u1).sin_cos());
+        let (r, (sin, cos)) = (u0.sqrt(), sin_cos_of_turn(u1));
         let share = 0.5 * (1.0 + stretched.z);
         let x = r * cos;
         let y = (1.0 - share) * (1.0 - x * x).max(0.0).sqrt() + share * r * sin;
@@ -95,6 +97,8 @@ fn ggx_visible(tan2: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::{Sampler, chi_squared::assert_drawn_from};
 

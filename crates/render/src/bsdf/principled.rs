@@ -8,7 +8,7 @@
 //!
 //! *Reciprocity*: all lobes but refraction, which changes radiance by the square of the index.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use glam::{DVec3, dvec3};
 use vdf_scene::{Microfacets, Principled, Rgb, Texture, luminance};
@@ -18,7 +18,7 @@ use super::{
     material::{BLACK, MaterialPoint},
     microfacet::Facets,
 };
-use crate::frame::sample_cosine_hemisphere;
+use crate::frame::{sample_cosine_hemisphere, sin_cos_of_turn};
 
 /// Smoother facets are drawn as rough as this.
 const LEAST_ALPHA: f64 = 1e-3;
@@ -261,7 +261,7 @@ impl Gtr1 {
     fn sample(&self, [u0, u1]: [f64; 2]) -> DVec3 {
         let alpha2 = self.alpha * self.alpha;
         let cos2 = ((1.0 - alpha2.powf(1.0 - u1)) / (1.0 - alpha2)).clamp(0.0, 1.0);
-        let ((sin_phi, cos_phi), sin) = ((TAU * u0).sin_cos(), (1.0 - cos2).sqrt());
+        let ((sin_phi, cos_phi), sin) = (sin_cos_of_turn(u0), (1.0 - cos2).sqrt());
         dvec3(sin * cos_phi, sin * sin_phi, cos2.sqrt())
     }
 }

@@ -12,7 +12,7 @@ use vdf_scene::{MeshAttributes, Rgb, Surface, Texture};
 
 use super::LightSample;
 use crate::{
-    frame::direction_about,
+    frame::{direction_about, sin_cos_of_turn},
     world::{curved_lift, glow, lift, parametrization},
 };
 
@@ -212,7 +212,7 @@ impl Ball {
         let distance = distance2.sqrt();
         let below = u0 * cone;
         let sin2 = below * (2.0 - below);
-        let direction = direction_about(to_centre / distance, 1.0 - below, sin2.sqrt(), TAU * u1);
+        let direction = direction_about(to_centre / distance, 1.0 - below, sin2.sqrt(), u1);
         let half_chord = (self.radius * self.radius - distance2 * sin2).max(0.0).sqrt();
         let t = distance * (1.0 - below) - half_chord;
         let local = shape.snapped(shape.to_local(from + direction * t));
@@ -241,7 +241,7 @@ fn curved_area(shape: &CurvedShape) -> f64 {
 
 /// A point of the canonical shape, uniform over its area.
 fn sample_curved(kind: CurvedKind, [u0, u1]: [f64; 2]) -> DVec3 {
-    let (sin, cos) = (TAU * u1).sin_cos();
+    let (sin, cos) = sin_cos_of_turn(u1);
     match kind {
         CurvedKind::Sphere => {
             let r = 2.0 * (u0 * (1.0 - u0)).max(0.0).sqrt();

@@ -47,6 +47,39 @@ impl Extent {
     }
 }
 
+/// Where a segment crosses the boundary of a convex region, and whether it enters; in order, at most twice.
+pub(super) type BoxCrossings = [Option<(f64, bool)>; 2];
+
+impl Extent {
+    /// The crossings of a box, without a look at its triangles; `None` if it is none, or an end has a coordinate in common with it.
+    ///
+    /// On which sides of the box the ends lie is exact, and a box is convex: so what the segment does is certain if just one of them is inside. Else rounding may
+    /// decide whether an edge is passed, and it is passed on both sides or on none.
+    #[inline]
+    pub(super) fn crossings(&self, segment: &Segment) -> Option<BoxCrossings> {
+        if self.is_not_met(segment) {
+            return Some([None; 2]);
+        }
+        let (Segment { p, q }, Bounds { min, max }) = (*segment, self.bounds);
+        let level = [p, q].map(|end| end.cmpeq(min) | end.cmpeq(max));
+        if !self.closed_box || (level[0] | level[1]).any() {
+            return None;
+        }
+        let [starts_in, ends_in] = [p, q].map(|end| (end.cmpgt(min) & end.cmplt(max)).all());
+        // Infinite where the segment is parallel to a face.
+        let (low, high) = ((min - p) / (q - p), (max - p) / (q - p));
+        let (enters, leaves) =
+            (low.min(high).max_element().clamp(0.0, 1.0), low.max(high).min_element().clamp(0.0, 1.0));
+        Some(match (starts_in, ends_in) {
+            (true, true) => [None; 2],
+            (true, false) => [Some((leaves, false)), None],
+            (false, true) => [Some((enters, true)), None],
+            (false, false) if enters < leaves => [Some((enters, true)), Some((leaves, false))],
+            (false, false) => [None; 2],
+        })
+    }
+}
+
 /// True if the triangles are the six faces of the box, each cut along a diagonal, with all normals outwards or all inwards.
 fn is_closed_box(triangles: &[Triangle], Bounds { min, max }: Bounds) -> bool {
     let mut covered = [[0_u32; 2]; 6];

@@ -193,7 +193,9 @@ impl Regions {
             return ControlFlow::Continue(None);
         }
         let (mut regions, mut t0) = (start.clone(), 0.0);
-        for Crossing { t, region, enters } in self.crossings(segment) {
+        let mut crossings = Crossings::new();
+        self.find_crossings(segment, &mut crossings);
+        for Crossing { t, region, enters } in crossings {
             if enters != regions.contains(region) {
                 visit(MediumInterval { medium: self.medium(&regions), t0, t1: t }, &regions)?;
                 regions.set(region, enters);
@@ -220,21 +222,45 @@ impl Regions {
     }
 
     /// All crossings in order; of those of a region at one place all have the same effect.
-    fn crossings(&self, segment: &Segment) -> Crossings {
-        let mut crossings = Crossings::new();
+    fn find_crossings(&self, segment: &Segment, crossings: &mut Crossings) {
+        if !self.cross_boxes(segment, crossings) {
+            crossings.clear();
+            self.cross_all(segment, crossings);
+        }
+    }
+
+    /// The same of boundaries of any shape.
+    fn cross_all(&self, segment: &Segment, crossings: &mut Crossings) {
         self.bvh.visit_hits(segment, |hit| {
             let Face { region, inwards } = self.faces[hit.triangle as usize];
             let from_front = self.triangles[hit.triangle as usize].is_entered_by(segment);
             crossings.push(Crossing { t: hit.t, region, enters: from_front != inwards });
         });
         if !self.spheres.is_empty() {
-            self.cross_spheres(segment, &mut crossings);
+            self.cross_spheres(segment, crossings);
         }
         if crossings.len() > 1 {
             crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.region.cmp(&b.region)));
-            self.settle(&mut crossings, segment);
+            self.settle(crossings, segment);
         }
-        crossings
+    }
+
+    /// The same if there are but few boundaries, each of them a box or not met; else false, and what was found is not all.
+    #[inline]
+    fn cross_boxes(&self, segment: &Segment, crossings: &mut Crossings) -> bool {
+        if self.extents.len() > MAX_COMPARED {
+            return false;
+        }
+        for (extent, region) in self.extents.iter().zip(0..) {
+            let Some(of_box) = extent.crossings(segment) else { return false };
+            for (t, enters) in of_box.into_iter().flatten() {
+                crossings.push(Crossing { t, region, enters });
+            }
+        }
+        if self.extents.len() > 1 {
+            crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.region.cmp(&b.region)));
+        }
+        true
     }
 
     /// A sphere is convex, so that on which sides of it the ends lie says which crossings there are: exactly.

@@ -113,7 +113,7 @@ fn a_box_and_its_triangles_say_the_same() {
         (vec3(1e6, -1e6, 3.0), vec3(1e6 + 1.0, -1e6 + 0.5, 3.0 + 1e-6)),
         (vec3(-1e-20, -2e-20, 0.0), vec3(1e-20, 2e-20, 5e-20)),
     ];
-    let (mut left, mut short, mut gone) = (0, 0, 0);
+    let (mut left, mut short, mut gone, mut compared) = (0, 0, 0, 0);
     for (n, (min, max)) in (0..).zip(boxes) {
         let triangles = cuboid(min, max, 0b01_1010 + n);
         let extent = Extent::of(&triangles);
@@ -146,10 +146,42 @@ fn a_box_and_its_triangles_say_the_same() {
                 assert_eq!(flight, FreeFlight::Passed(RegionSet::default()), "{segment:?}, {tau}");
             }
             let intervals = fast.intervals(&segment, &start);
-            assert_eq!((intervals.free_flight(tau), intervals.optical_depth()), (flight, depth), "{segment:?}, {tau}");
-            assert_eq!(intervals.end(), &slow.at_end(&segment, &start));
+            // Exact for a box, wherever the crossings were rounded to.
+            let beside = |end: DVec3| end.cmpeq(min).any() || end.cmpeq(max).any();
+            if !beside(segment.p) && !beside(segment.q) {
+                let inside = segment.q.cmpgt(min).all() && segment.q.cmplt(max).all();
+                assert_eq!(!intervals.end().is_empty(), inside, "{segment:?}");
+            }
+            // Where the segment hardly moves along the axis of a face that it crosses, the crossing of a triangle is rounded far more than the box's.
+            let (p, q) = (segment.p, segment.q);
+            let moves = |k: &usize| [min[*k], max[*k]].iter().any(|face| (p[*k] < *face) != (q[*k] < *face));
+            let grazes = |k: usize| (p[k].abs() + q[k].abs()).max(segment.length()) > 1e3 * (q[k] - p[k]).abs();
+            // Nor are winding numbers to be trusted where an end is on the box but for rounding.
+            let apart = |end: DVec3| (end - min).abs().min((end - max).abs()).min_element() > 1e-9 * diagonal;
+            if !apart(p) || !apart(q) || [0, 1, 2].into_iter().filter(moves).any(grazes) {
+                continue;
+            }
+            compared += 1;
+            assert_eq!(intervals.end(), &slow.at_end(&segment, &start), "{segment:?}");
+            // Crossings may differ by what counts as one place, at either end of the part in the box; and where the segment starts far away, its places
+            // are rounded by more than that.
+            let others = slow.intervals(&segment, &start);
+            let parts = intervals.parts().chain(others.parts());
+            let far = parts.filter(|i| i.medium.is_some()).map(|i| i.t1).fold(0.0, f64::max);
+            let doubt = 2.0 * slow.doubt(&segment) + 4e3 * f64::EPSILON * far;
+            let of_depth = 0.3 / diagonal * segment.length() * doubt + 1e-15 * depth;
+            let of_box = intervals.optical_depth();
+            assert!((of_box - depth).abs() <= of_depth, "{segment:?}: {of_box} {depth}");
+            match (intervals.free_flight(tau), flight) {
+                (FreeFlight::Passed(a), FreeFlight::Passed(b)) => assert_eq!(a, b),
+                (FreeFlight::Collision { t: a, .. }, FreeFlight::Collision { t: b, .. }) => {
+                    assert!((a - b).abs() <= doubt, "{segment:?}, {tau}: {a} {b}");
+                }
+                (a, b) => assert!((tau - depth).abs() <= of_depth, "{segment:?}, {tau}: {a:?} {b:?}"),
+            }
         }
     }
+    assert!(compared > 5000, "{compared}");
     assert!(left > 2000 && short > 2000 && gone > 2000, "{left} left the box, {short} did not, {gone} for good");
 }
 
