@@ -10,6 +10,7 @@ mod estimators;
 mod fog;
 mod furnace;
 mod grids;
+mod light_paths;
 mod stopping;
 mod surfaces;
 mod transmittance;

@@ -124,7 +124,7 @@ impl OtherShapes {
     }
 
     /// What of light passes all veils on the closed segment; `passes` says it for each place that is met.
-    pub(crate) fn pass(&self, segment: &Segment, passes: impl Fn(Met) -> Rgb) -> Rgb {
+    pub(crate) fn pass(&self, segment: &Segment, mut passes: impl FnMut(Met) -> Rgb) -> Rgb {
         let mut product = Rgb::ONE;
         self.veils.bvh.visit_hits(segment, |hit| {
             let i = hit.triangle as usize;

@@ -108,8 +108,8 @@ impl Sampler {
         #[allow(clippy::cast_precision_loss, reason = "53 bits are exact")]
         let random = (mix(self.counter, self.key) >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0);
         match &mut self.sobol {
-            None => random,
-            Some(sobol) => sobol.next_1d(random),
+            Some(sobol) if sobol.dimension != sobol.even => sobol.next_1d(random),
+            _ => random,
         }
     }
 
@@ -145,13 +145,10 @@ impl Sobol {
         }
     }
 
-    /// The next number, with the bits of `random` below those that the sequence has.
-    #[inline]
+    /// The next number, one of those that are even, with the bits of `random` below those that the sequence has.
+    #[inline(never)]
     fn next_1d(&mut self, random: f64) -> f64 {
         const STEP: f64 = 1.0 / 8_388_608.0;
-        if self.dimension == self.even {
-            return random;
-        }
         if self.dimension.is_multiple_of(4) {
             self.take_four();
         }

@@ -84,6 +84,8 @@ pub struct Statistics {
     pub rays: u64,
     /// Segments of which it was found which parts a point light sees (`--estimator lit`).
     pub lit_segments: u64,
+    /// Segments between events of camera paths and of paths from lights that were asked whether anything is in the way.
+    pub connections: u64,
     /// Free flights asked for a proof (segment-first).
     pub flights: u64,
     /// Free flights proved, each a ray saved.
@@ -200,6 +202,7 @@ impl Statistics {
             proved_occluded: counters.proved_occluded,
             rays: counters.rays,
             lit_segments: counters.lit_segments,
+            connections: counters.connections,
             flights: counters.flights,
             flights_proved: counters.flights_proved,
             p_accelerated_flights: ratio(counters.flights_proved, counters.flights),
@@ -348,6 +351,9 @@ impl fmt::Display for Statistics {
         }
         if self.lit_segments > 0 {
             write!(f, "\nlit            {} segments divided into lit and dark parts", self.lit_segments)?;
+        }
+        if self.connections > 0 {
+            write!(f, "\nconnections    {} to paths from lights", self.connections)?;
         }
         if self.refused > 0 {
             write!(f, "\nWARNING        {} samples were not finite or negative and were left out", self.refused)?;

@@ -11,7 +11,7 @@ use vdf_scene::{Bsdf, Emitter, Extinction, Medium, MeshAttributes, Rgb, Scene, T
 use vdf_visibility::LightShape;
 
 use crate::{
-    GridExtent,
+    GridExtent, RegionSet,
     bsdf::{Material, MaterialPoint},
     lights::Lights,
     media::Media,
@@ -39,6 +39,8 @@ pub struct World {
     pub(crate) others: Option<Box<OtherShapes>>,
     /// A box in which no boundary of a medium is met, if all lights are points in it and there are only opaque triangles.
     pub(crate) clear: Option<Bounds>,
+    /// The regions that each of [`Lights::beams`] starts in.
+    pub(crate) beam_regions: Vec<RegionSet>,
     /// The materials of the surfaces that are no plain Lambertian ones.
     pub(crate) materials: Vec<Shading>,
     surface_of_triangle: Vec<u32>,
@@ -203,6 +205,7 @@ impl World {
         let bounds = positions(scene).fold(matter, Bounds::with);
         let lights = Lights::new(scene, reach(scene, matter.extent().length(), bounds.extent().length()));
         Self {
+            beam_regions: lights.beams().iter().map(|beam| media.regions_at(beam.position)).collect(),
             clear: clear(&media, &lights).filter(|_| others.is_none()),
             media,
             lights,
@@ -433,8 +436,8 @@ pub(crate) fn curved_lift(shape: &CurvedShape) -> f64 {
 /// 2¹⁷ times as much, and still 2⁸ times finer than the step of single precision there.
 #[inline]
 pub(crate) fn lift(triangle: &Triangle) -> f64 {
-    let [a, b, c] = triangle.vertices_f64().map(|v| v.abs());
-    a.max(b).max(c).max_element() * (1.0 / 4_294_967_296.0)
+    let [a, b, c] = triangle.vertices_f64();
+    a.abs().max(b.abs()).max(c.abs()).max_element() * (1.0 / 4_294_967_296.0)
 }
 
 /// A box in which no boundary is met, if all lights are points inside of it.

@@ -29,6 +29,8 @@ pub struct Counters {
     pub flights_proved: u64,
     /// Segments of which it was found which parts a point light sees.
     pub lit_segments: u64,
+    /// Segments between events of a camera path and one of a light's that were asked whether anything is in the way.
+    pub connections: u64,
     /// Camera paths.
     pub paths: u64,
     /// Paths whose radiance was not finite or negative and was therefore left out. Must be 0.
@@ -122,6 +124,7 @@ impl std::ops::AddAssign for Counters {
         self.flights = self.flights.saturating_add(other.flights);
         self.flights_proved = self.flights_proved.saturating_add(other.flights_proved);
         self.lit_segments = self.lit_segments.saturating_add(other.lit_segments);
+        self.connections = self.connections.saturating_add(other.connections);
         self.paths = self.paths.saturating_add(other.paths);
         self.refused = self.refused.saturating_add(other.refused);
     }

@@ -119,6 +119,13 @@ impl<R: Recorder> Visibility<'_, R> {
         self.intersect(flight, counters)
     }
 
+    /// Whether the closed segment between two places meets no occluder. No method is asked, for the segment leads to no light.
+    #[inline]
+    pub fn connected(&self, segment: &Segment, counters: &mut Counters) -> bool {
+        counters.connections += 1;
+        !self.bvh.occluded(segment)
+    }
+
     /// Which parts of `segment` a point light at `light` sees. No method is asked, for the hierarchy answers for all of it at once.
     #[inline]
     #[must_use]

@@ -62,7 +62,7 @@ struct Header {
 
 /// [`Counters`], in the order that `counts!` gives them.
 #[derive(Serialize, Deserialize)]
-struct Counts([u64; 13]);
+struct Counts([u64; 14]);
 
 macro_rules! counts {
     ($($counter:ident),*) => {
@@ -94,6 +94,7 @@ counts!(
     flights,
     flights_proved,
     lit_segments,
+    connections,
     paths,
     refused
 );

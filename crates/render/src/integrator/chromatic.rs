@@ -73,8 +73,8 @@ impl<R: Recorder> Tracer<'_, R> {
             let vertex = Vertex::InMedium { phase, direction };
             let (light, flight) = self.draw_emitter(point, sampler);
             let Some(light) = light else { continue };
-            if let Some((value, ..)) = self.connect(point, &vertex, regions, &light, flight, counters) {
-                sum += albedo * (densities / mean).as_vec3() * value;
+            if let Some(arriving) = self.connect(point, &vertex, regions, &light, flight, counters) {
+                sum += albedo * (densities / mean).as_vec3() * arriving.value;
             }
         }
         sum / samples as f32

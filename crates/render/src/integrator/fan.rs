@@ -103,11 +103,11 @@ impl<'a> Fan<'a> {
     #[inline]
     pub(super) fn draw_emitter(&self, sampler: &mut Sampler) -> usize {
         if self.lights.count() == 1 {
-            sampler.skip(3);
+            sampler.skip(1 + self.lights.numbers_of_place());
             return 0;
         }
         let chosen = choose(sampler.next_1d(), self.lights.count());
-        sampler.skip(2);
+        sampler.skip(self.lights.numbers_of_place());
         chosen.map_or(0, |(emitter, _)| emitter)
     }
 

@@ -1,5 +1,6 @@
 //! The integrators, and what they share: next-event estimation and multiple importance sampling.
 
+mod bounce;
 mod chromatic;
 mod equiangular;
 mod fan;
@@ -17,6 +18,7 @@ use vdf_geometry::{Hit, Segment};
 use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
+use self::bounce::LightPath;
 pub use self::kind::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 pub(crate) use self::raymarch::evenly;
 use crate::{
@@ -61,7 +63,12 @@ enum Origin {
     /// The camera: no emitter sampling competes.
     Camera,
     /// A scattering event at `point` that drew the direction with density `pdf` and also sampled the emitters.
-    Scattering { point: DVec3, pdf: f64 },
+    Scattering {
+        point: DVec3,
+        pdf: f64,
+        /// Whether it was connected to a [`Bounce`](bounce::Bounce), too.
+        connected: bool,
+    },
     /// A mirror or a lens, which sends light in one direction only: no emitter sampling competes.
     Delta,
 }
@@ -87,6 +94,8 @@ struct Path {
     /// The square of the index of refraction that the path is in, over that where it began: so much less radiance is worth there. Roulette leaves it
     /// alone, or it would kill what goes into glass.
     compression: f32,
+    /// A path of the light that its events are connected to.
+    light_path: LightPath,
     /// What its free flights are worth in each channel; the mean is 1. All are 1 unless a medium is chromatic.
     worth: DVec3,
     /// Light gathered so far.
@@ -104,6 +113,7 @@ impl Path {
             throughput: Rgb::ONE,
             aim: 1.0,
             compression: 1.0,
+            light_path: LightPath::Never,
             worth: DVec3::ONE,
             radiance: Rgb::ZERO,
         }
@@ -119,6 +129,16 @@ struct Aim<'a> {
     light: &'a LightSample,
     /// Of [`Tracer::flight_to_emitter`].
     flight: Option<f64>,
+}
+
+/// Light that arrives at an event from a sample of an emitter.
+struct Arriving {
+    /// Scattered at the event, over the density of the sample.
+    value: Rgb,
+    /// The density with which the event's own sampling draws this direction.
+    pdf: f64,
+    /// Whether nothing that lets light through is on the way.
+    is_straight: bool,
 }
 
 /// The end of a path so far, where light may be gathered.
@@ -237,10 +257,11 @@ impl<R: Recorder> Tracer<'_, R> {
         }
         let Some(surface) = self.light_at_end(path, surface) else { return false };
         let vertex = Vertex::OnSurface(surface);
-        path.radiance += path.throughput * self.direct_light(surface.point, &vertex, &regions, sampler, counters);
+        let direct = self.direct_light(surface.point, &vertex, &regions, &path.origin, None, sampler, counters);
+        path.radiance += path.throughput * direct;
         let (direction, pdf) = sample_diffuse(surface.normal, sampler.next_2d());
         path.throughput *= surface.reflectance;
-        path.origin = Origin::Scattering { point: surface.point, pdf };
+        path.origin = Origin::Scattering { point: surface.point, pdf, connected: false };
         path.on_surface = true;
         path.ray = self.ray(surface.point, direction, regions);
         true
@@ -258,35 +279,35 @@ impl<R: Recorder> Tracer<'_, R> {
         self.may_scatter(path.depth).then_some(surface)
     }
 
-    /// Next-event estimation where direction sampling may find the same light: weighted by the power heuristic.
+    /// Next-event estimation where direction sampling may find the same light, weighted by the power heuristic, or a light path may bring it, for an event of a
+    /// path from this origin. `place` is a place on an emitter if one is drawn already.
     #[inline]
+    #[allow(clippy::too_many_arguments, reason = "what an event has and what a path has")]
     fn direct_light(
         &self,
         point: DVec3,
         vertex: &Vertex,
         regions: &RegionSet,
+        origin: &Origin,
+        place: Option<&EmitterPoint>,
         sampler: &mut Sampler,
         counters: &mut Counters,
     ) -> Rgb {
-        self.emitter_sample(point, vertex, regions, sampler, counters).map_or(Rgb::ZERO, |(value, light_pdf, pdf)| {
+        let (light, flight) = match place {
+            None => self.draw_emitter(point, sampler),
+            Some(place) => (self.world.lights.seen_from(point, place), self.flight_to_emitter(sampler)),
+        };
+        let Some(light) = light else { return Rgb::ZERO };
+        let Some(arriving) = self.connect(point, vertex, regions, &light, flight, counters) else { return Rgb::ZERO };
+        let weight = if light.pdf > 0.0 {
+            power_heuristic(light.pdf, arriving.pdf)
+        } else if arriving.is_straight {
             // A point emitter is found by no scattered ray.
-            if light_pdf > 0.0 { value * to_f32(power_heuristic(light_pdf, pdf)) } else { value }
-        })
-    }
-
-    /// One emitter sample: the light that arrives, scattered at the vertex, over the density; that density; and the
-    /// density of the vertex's own sampling for this direction.
-    #[inline]
-    fn emitter_sample(
-        &self,
-        point: DVec3,
-        vertex: &Vertex,
-        regions: &RegionSet,
-        sampler: &mut Sampler,
-        counters: &mut Counters,
-    ) -> Option<(Rgb, f64, f64)> {
-        let (light, flight) = self.draw_emitter(point, sampler);
-        self.connect(point, vertex, regions, &light?, flight, counters)
+            self.weight_beside_bounce(origin, point, vertex, &light)
+        } else {
+            1.0
+        };
+        arriving.value * to_f32(weight)
     }
 
     /// A sample of an emitter, as seen from `point`, and what [`Tracer::flight_to_emitter`] draws.
@@ -298,17 +319,22 @@ impl<R: Recorder> Tracer<'_, R> {
         (place.and_then(|place| self.world.lights.seen_from(point, &place)), flight)
     }
 
-    /// A place on an emitter, each equally likely, and what is left of the number that chose the emitter: uniform. Takes three numbers in any case.
+    /// A place on an emitter, each equally likely, and what is left of the number that chose the emitter: uniform. Takes as
+    /// many numbers whichever it is.
     #[inline]
     fn draw_place(&self, sampler: &mut Sampler) -> (Option<EmitterPoint>, f64) {
         let lights = &self.world.lights;
         let u = sampler.next_1d();
-        let chosen = choose(u, lights.count());
-        let Some((emitter, u)) = chosen.filter(|(emitter, _)| lights.point_position(*emitter).is_none()) else {
-            sampler.skip(2);
-            return chosen.map_or((None, u), |(emitter, u)| (lights.sample_point(emitter, [0.0; 2]), u));
+        let chosen = if lights.count() == 1 { Some((0, u)) } else { choose(u, lights.count()) };
+        let Some((emitter, u)) = chosen else { return (None, u) };
+        let needs_numbers = lights.numbers_of_place() > 0 && lights.point_position(emitter).is_none();
+        let numbers = if needs_numbers {
+            sampler.next_2d()
+        } else {
+            sampler.skip(lights.numbers_of_place());
+            [0.0; 2]
         };
-        (lights.sample_point(emitter, sampler.next_2d()), u)
+        (lights.sample_point(emitter, numbers), u)
     }
 
     /// The query that a sample of an emitter depends on, and the light that arrives if it is unoccluded; `None` if that is nothing anyway. For vertices in a medium, with
@@ -334,7 +360,7 @@ impl<R: Recorder> Tracer<'_, R> {
         }
     }
 
-    /// As [`Tracer::emitter_sample`], for this sample of an emitter.
+    /// The light that arrives from a sample of an emitter, if any does.
     #[inline]
     fn connect(
         &self,
@@ -344,30 +370,46 @@ impl<R: Recorder> Tracer<'_, R> {
         light: &LightSample,
         flight: Option<f64>,
         counters: &mut Counters,
-    ) -> Option<(Rgb, f64, f64)> {
+    ) -> Option<Arriving> {
         let (value, pdf) = vertex.eval(self.world, light.direction);
         let value = value * light.weight;
         if value.max_element() <= 0.0 {
             return None;
         }
-        let (point, through);
-        let (point, regions) = match vertex {
-            Vertex::OnMaterial(s, shading) if light.direction.dot(s.normal) < 0.0 => {
-                (point, through) = self.behind(s, shading, regions);
-                (point, &through)
+        let through;
+        let (point, regions) = match self.side_towards(light.direction, vertex, regions) {
+            None => (from, regions),
+            Some(behind) => {
+                through = behind.1;
+                (behind.0, &through)
             }
-            _ => (from, regions),
         };
         let query =
             ShadowQuery { from: point, to: light.point, emitter: light.emitter, kind: vertex.query_kind(light) };
         if !self.visibility.unoccluded(&query, counters) {
             return None;
         }
-        let value = match &self.world.others {
-            None => value,
-            Some(others) => value * self.passes(others, &Segment::new(point, light.point), light.direction)?,
+        let (passed, is_straight) = match &self.world.others {
+            None => (Rgb::ONE, true),
+            Some(others) => self.passes(others, &Segment::new(point, light.point), light.direction)?,
         };
-        Some((value * self.transmittance_to(point, light, regions, flight), light.pdf, pdf))
+        let value = value * passed * self.transmittance_to(point, light, regions, flight);
+        Some(Arriving { value, pdf, is_straight })
+    }
+
+    /// Where a segment in this direction starts, and in which regions, if it leaves the surface on the side that is not seen.
+    #[inline]
+    fn side_towards(&self, direction: DVec3, vertex: &Vertex, regions: &RegionSet) -> Option<(DVec3, RegionSet)> {
+        match vertex {
+            Vertex::OnMaterial(s, shading) if direction.dot(s.normal) < 0.0 => Some(self.behind(s, shading, regions)),
+            _ => None,
+        }
+    }
+
+    /// Whether an event with so many scattering events up to it is connected to a light path: one more has to be allowed.
+    #[inline]
+    fn connects(&self, path: &Path, depth: u32) -> bool {
+        !matches!(path.light_path, LightPath::Never) && self.may_scatter(depth + 1)
     }
 
     /// The estimate of the transmittance from a point in these regions to an emitter.
@@ -401,7 +443,7 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline]
     fn emitted(&self, surface: &SurfacePoint, direction: DVec3, origin: &Origin) -> Rgb {
         match (origin, surface.emitter) {
-            (Origin::Scattering { point, pdf }, Some(emitter)) if surface.emitted != Rgb::ZERO => {
+            (Origin::Scattering { point, pdf, .. }, Some(emitter)) if surface.emitted != Rgb::ZERO => {
                 let cos_theta = -direction.dot(surface.normal);
                 let light_pdf = self.world.lights.pdf_area(emitter, point.distance(surface.point), cos_theta);
                 surface.emitted * to_f32(power_heuristic(*pdf, light_pdf))

@@ -235,8 +235,8 @@ impl<R: Recorder> Tracer<'_, R> {
         // What lets light through has a say in what arrives.
         if self.world.others.is_some() {
             let &Aim { point, vertex, regions, light, flight } = at;
-            if let Some((value, ..)) = self.connect(point, vertex, regions, light, flight, counters) {
-                gathered.sum += weighted(value);
+            if let Some(arriving) = self.connect(point, vertex, regions, light, flight, counters) {
+                gathered.sum += weighted(arriving.value);
             }
             return;
         }

@@ -31,14 +31,18 @@ impl<R: Recorder> Tracer<'_, R> {
         others.first(segment, hit).map(|met| self.world.surface_at(&met, segment, direction))
     }
 
-    /// What of light passes the other shapes on a segment that no opaque triangle meets; `None` if nothing does.
+    /// What of light passes the other shapes on a segment that no opaque triangle meets, and whether it met none of them; `None` if nothing passes.
     #[inline(never)]
-    pub(super) fn passes(&self, others: &OtherShapes, segment: &Segment, direction: DVec3) -> Option<Rgb> {
+    pub(super) fn passes(&self, others: &OtherShapes, segment: &Segment, direction: DVec3) -> Option<(Rgb, bool)> {
         if others.occlude(segment) {
             return None;
         }
-        let passed = others.pass(segment, |met| self.world.passes(&met, segment, direction));
-        (passed.max_element() > 0.0).then_some(passed)
+        let mut is_straight = true;
+        let passed = others.pass(segment, |met| {
+            is_straight = false;
+            self.world.passes(&met, segment, direction)
+        });
+        (passed.max_element() > 0.0).then_some((passed, is_straight))
     }
 
     /// Where a ray starts that leaves a surface on the side that is not seen, and in which regions.
@@ -66,9 +70,15 @@ impl<R: Recorder> Tracer<'_, R> {
         path.radiance += path.throughput * self.emitted(surface, path.ray.direction, &path.origin);
         let material = &self.world.materials[shading.material as usize].material;
         let may_scatter = self.may_scatter(path.depth + 1);
+        let mut connected = false;
         if may_scatter && material.has_smooth_lobes() {
             let vertex = Vertex::OnMaterial(surface, shading);
-            path.radiance += path.throughput * self.direct_light(surface.point, &vertex, &regions, sampler, counters);
+            let mut light = self.direct_light(surface.point, &vertex, &regions, &path.origin, None, sampler, counters);
+            connected = self.connects(path, path.depth + 1);
+            if connected {
+                light += self.light_by_bounce(path, surface.point, &vertex, &regions, sampler, counters);
+            }
+            path.radiance += path.throughput * light;
         }
         let (choice, u) = (sampler.next_1d(), sampler.next_2d());
         let Some(sample) = material.sample(shading.wi, &shading.at, choice, u) else { return false };
@@ -92,7 +102,7 @@ impl<R: Recorder> Tracer<'_, R> {
                     return false;
                 }
                 path.origin = match sample.lobe {
-                    Lobe::Smooth => Origin::Scattering { point: surface.point, pdf: sample.pdf },
+                    Lobe::Smooth => Origin::Scattering { point: surface.point, pdf: sample.pdf, connected },
                     _ => Origin::Delta,
                 };
             }

@@ -1,6 +1,7 @@
 //! Next-event estimation: choosing an emitter and a point on it, and the density of doing so. One file a kind of emitter.
 
 mod area;
+mod beam;
 mod constant;
 mod directional;
 mod envmap;
@@ -11,6 +12,7 @@ mod spot;
 use glam::DVec3;
 use vdf_scene::{Emitter, Rgb, Scene};
 
+pub(crate) use self::beam::Beam;
 use self::{
     area::{AreaLight, AreaPoint},
     envmap::EnvmapLight,
@@ -34,6 +36,11 @@ pub struct Lights {
     /// How far a direction is followed before it is infinitely far away, in world units.
     reach: f64,
     may_be_met: bool,
+    numbers_of_place: u32,
+    /// Of each that is a point.
+    beams: Vec<Beam>,
+    /// By number of emitter: with what density a ray from a light leaves it in one of its directions, over that with which the emitter itself is sampled; 0 if it is no point.
+    density_of_beam: Vec<f64>,
 }
 
 #[derive(Debug)]
@@ -142,7 +149,33 @@ impl Lights {
         let envmap = lights.iter().position(|l| matches!(l, Light::Envmap(_)));
         let may_be_met =
             background != Rgb::ZERO || envmap.is_some() || scene.surfaces.iter().any(|s| s.radiance.is_some());
-        Self { all: (0..lights.len()).collect(), lights, points, others, background, envmap, reach, may_be_met }
+        let is_point = |light: &Light| matches!(light, Light::Point { .. } | Light::Spot(_) | Light::Projector(_));
+        let numbers_of_place = if lights.iter().all(is_point) { 0 } else { 2 };
+        let all = (0..lights.len()).collect();
+        let beam = |(i, light): (usize, &Light)| match light {
+            Light::Point { position, .. } => Some(Beam::sphere(i, *position)),
+            Light::Spot(light) => Beam::cone(i, light.position, light.direction, light.cutoff),
+            Light::Projector(light) => Beam::cone(i, light.position, light.direction, light.angle()),
+            _ => None,
+        };
+        let beams: Vec<_> = lights.iter().enumerate().filter_map(beam).collect();
+        let mut density_of_beam = vec![0.0; lights.len()];
+        for beam in &beams {
+            density_of_beam[beam.emitter] = beam.density * lights.len() as f64 / beams.len() as f64;
+        }
+        Self {
+            lights,
+            points,
+            all,
+            others,
+            background,
+            envmap,
+            reach,
+            may_be_met,
+            numbers_of_place,
+            beams,
+            density_of_beam,
+        }
     }
 
     /// Radiance of a ray that leaves the scene in the unit direction `direction`.
@@ -177,6 +210,25 @@ impl Lights {
         self.may_be_met
     }
 
+    /// So many random numbers are set aside for a place on an emitter, whichever it is: none if all are points.
+    #[inline]
+    pub(crate) const fn numbers_of_place(&self) -> u32 {
+        self.numbers_of_place
+    }
+
+    /// The directions that rays leave the points, spots and projectors in.
+    #[inline]
+    pub(crate) fn beams(&self) -> &[Beam] {
+        &self.beams
+    }
+
+    /// The density of a direction from an emitter, per steradian and for a ray of any of [`Lights::beams`], over the probability of the emitter's own
+    /// samples; 0 if no ray leaves it.
+    #[inline]
+    pub(crate) fn density_of_beam(&self, emitter: usize) -> f64 {
+        self.density_of_beam[emitter]
+    }
+
     /// How many emitters there are.
     #[inline]
     pub(crate) const fn count(&self) -> usize {
@@ -204,6 +256,9 @@ impl Lights {
     /// Draws a place on an emitter. `None` if it has none.
     #[inline]
     pub(crate) fn sample_point(&self, emitter: usize, u: [f64; 2]) -> Option<EmitterPoint> {
+        if self.numbers_of_place == 0 {
+            return Some(EmitterPoint { emitter, place: Place::Point });
+        }
         let place = match &self.lights[emitter] {
             Light::Point { .. } | Light::Spot(_) | Light::Projector(_) => Place::Point,
             Light::Area(light) if light.ball().is_none() => Place::Area(light.sample(u)?),

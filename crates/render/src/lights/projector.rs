@@ -25,6 +25,11 @@ pub(super) fn uv(slide: &Slide, axis: DVec3, direction: DVec3) -> DVec2 {
 }
 
 impl ProjectorLight {
+    /// Half the angle of a cone about the picture.
+    pub(super) fn angle(&self) -> f64 {
+        self.slide.axes.map(|a| a.length_squared().recip()).into_iter().sum::<f64>().sqrt().atan()
+    }
+
     /// The one sample there is; `None` beyond the picture.
     pub(super) fn sample(&self, emitter: usize, from: DVec3, choices: f64) -> Option<LightSample> {
         let mut sample = point::sample(emitter, self.position, Rgb::ONE, from, choices)?;

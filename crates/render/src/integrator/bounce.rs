@@ -1,0 +1,190 @@
+//! Light that comes to a path from a point by way of one more place: a path of the light, one event long, that the events of a camera path are connected to.
+//!
+//! *Idea.* What a scattered ray finds is seldom bright: near a point light a wall, or fog, is worth hundreds of times what it is elsewhere, and few rays get
+//! there. A ray from the light gets there just as often as light does. So for each camera path a ray is sent from a light, y the place where it
+//! is scattered first, and every event x of the camera path is lit by it.
+//!
+//! *Definition.* The light that is scattered at y and then at x is estimated twice: by the ray that leaves x, if its next event is at y and asks for the light
+//! there, and by the connection of x with y. With d the distance from x to y, r that from y to the light, θ and θ' the angles at y to x and to the light, p the density of the
+//! direction at x and q that of the direction at the light, their densities at y are, but for transmittances, p cos θ/d² and q cos θ'/r²; in fog without the cosines. Each is
+//! weighted by its share in the sum of both (balance heuristic \[Veach1997\]). So the squares of both distances cancel, and no estimate is large where y is
+//! close to x or to the light.
+//!
+//! *Why it is unbiased.* The weights of a path add up to 1, whatever densities they are made of. A ray of the light ends at the first shape that it meets, and y has to
+//! see the light by the very query that an event asks. Through a veil, or from the other side of a surface, a light's ray never gets to y: then the
+//! other estimate has all the weight.
+//!
+//! *Cost.* A ray for each camera path, and a query of the hierarchy for each event: a fifth to a third of the time.
+
+use glam::DVec3;
+use vdf_geometry::Segment;
+use vdf_scene::{Phase, Rgb};
+use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
+
+use super::{Origin, Path, Tracer, Vertex, choose, to_f32, volpath::Event};
+use crate::{LightSample, PhaseFunction as _, RegionSet, Sampler, world::SurfacePoint};
+
+/// What a path has of its light path.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum LightPath {
+    /// It is to have none.
+    Never,
+    /// It is drawn with the first event that needs it.
+    NotYet,
+    /// It was drawn; `None` if it ended nowhere.
+    Drawn(Option<Bounce>),
+}
+
+/// Where a ray from a light is scattered first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounce {
+    place: Place,
+    /// What an event there gets from the light, over its density but for that of [`Bounce::density`].
+    light: LightSample,
+    /// q cos θ'/r²
+    density: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    InMedium { point: DVec3, albedo: Rgb, phase: Phase },
+    OnSurface(SurfacePoint),
+}
+
+impl<R: Recorder> Tracer<'_, R> {
+    /// Whether there is a light that a ray can be sent from, in proportion to what it radiates.
+    #[inline]
+    pub(super) fn has_light_paths(&self) -> bool {
+        !self.world.beam_regions.is_empty()
+    }
+
+    /// A place where light is scattered first. Takes three numbers.
+    #[inline(never)]
+    fn draw_bounce(&self, sampler: &mut Sampler, counters: &mut Counters) -> Option<Bounce> {
+        let lights = &self.world.lights;
+        let (i, u) = choose(sampler.next_1d(), lights.beams().len())?;
+        let beam = &lights.beams()[i];
+        let ray = self.ray(beam.position, beam.sample_direction(sampler.next_2d()), self.world.beam_regions[i].clone());
+        let direction = ray.direction;
+        let (place, point, cosine, kind) = match self.first_event(&mut Path::new(ray), -(-u).ln_1p(), counters) {
+            Event::Collision { point, medium, .. } => {
+                let (albedo, phase) = self.world.media.scattering(medium, point);
+                (Place::InMedium { point, albedo, phase }, point, 1.0, QueryKind::Spatial)
+            }
+            Event::Arrival { surface: Some(s), .. } => {
+                (Place::OnSurface(s), s.point, -direction.dot(s.normal), QueryKind::Superficial)
+            }
+            Event::Arrival { surface: None, .. } => return None,
+        };
+        let mut light = lights.seen_from(point, &lights.sample_point(beam.emitter, [0.0; 2])?)?;
+        let distance2 = point.distance_squared(beam.position);
+        let density = lights.density_of_beam(beam.emitter) * cosine / distance2;
+        let query = ShadowQuery { from: point, to: light.point, emitter: beam.emitter, kind };
+        if !(density > 0.0 && density.is_finite() && self.visibility.unoccluded(&query, counters)) {
+            return None;
+        }
+        light.weight *= to_f32(distance2 / (beam.density * lights.count() as f64)) * lights.beams().len() as f32;
+        Some(Bounce { place, light, density })
+    }
+
+    /// The light that comes to an event by way of the path's light path.
+    pub(super) fn light_by_bounce(
+        &self,
+        path: &mut Path,
+        point: DVec3,
+        vertex: &Vertex,
+        regions: &RegionSet,
+        sampler: &mut Sampler,
+        counters: &mut Counters,
+    ) -> Rgb {
+        if let LightPath::NotYet = path.light_path {
+            path.light_path = LightPath::Drawn(self.draw_bounce(sampler, counters));
+        }
+        let LightPath::Drawn(Some(bounce)) = &path.light_path else { return Rgb::ZERO };
+        let there = match &bounce.place {
+            Place::InMedium { point, .. } => *point,
+            Place::OnSurface(surface) => surface.point,
+        };
+        let (to, distance2) = (there - point, there.distance_squared(point));
+        if distance2 == 0.0 {
+            return Rgb::ZERO;
+        }
+        let to = to / distance2.sqrt();
+        let (value, pdf) = vertex.eval(self.world, to);
+        let (scattered, cosine) = self.scattered_at(bounce, to);
+        let value = value * scattered * bounce.light.weight;
+        if value.max_element() <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let through;
+        let (from, regions) = match self.side_towards(to, vertex, regions) {
+            None => (point, regions),
+            Some(behind) => {
+                through = behind.1;
+                (behind.0, &through)
+            }
+        };
+        let segment = Segment::new(from, there);
+        if !self.visibility.connected(&segment, counters) {
+            return Rgb::ZERO;
+        }
+        let passed = match &self.world.others {
+            None => Rgb::ONE,
+            Some(others) => self.passes(others, &segment, to).map_or(Rgb::ZERO, |(passed, _)| passed),
+        };
+        let transmittance = self.world.media.transmittance(&segment, regions);
+        // The weight over d².
+        let share = bounce.density / (pdf * cosine + bounce.density * distance2);
+        value * passed * to_f32(transmittance * share)
+    }
+
+    /// What of the light is scattered against `to`, over cos θ', with what it has of cos θ; and cos θ.
+    #[inline]
+    fn scattered_at(&self, bounce: &Bounce, to: DVec3) -> (Rgb, f64) {
+        let to_light = bounce.light.direction;
+        match &bounce.place {
+            Place::InMedium { albedo, phase, .. } => (*albedo * to_f32(phase.pdf_direction(to, to_light)), 1.0),
+            Place::OnSurface(surface) => {
+                let (cosine, cosine_to_light) = (-surface.normal.dot(to), surface.normal.dot(to_light));
+                if cosine <= 0.0 || cosine_to_light <= 0.0 {
+                    return (Rgb::ZERO, cosine);
+                }
+                let shading;
+                let vertex = match surface.place {
+                    None => Vertex::OnSurface(*surface),
+                    Some(_) => {
+                        let Some(there) = self.world.shading(surface, to) else { return (Rgb::ZERO, cosine) };
+                        shading = there;
+                        Vertex::OnMaterial(surface, &shading)
+                    }
+                };
+                (vertex.eval(self.world, to_light).0 * to_f32(cosine / cosine_to_light), cosine)
+            }
+        }
+    }
+
+    /// The weight of what an event gets straight from `light`, which has no density, where the event before it was connected to a light path.
+    #[inline]
+    pub(super) fn weight_beside_bounce(
+        &self,
+        origin: &Origin,
+        point: DVec3,
+        vertex: &Vertex,
+        light: &LightSample,
+    ) -> f64 {
+        let &Origin::Scattering { point: before, pdf, connected: true } = origin else { return 1.0 };
+        let cosines = |s: &SurfacePoint| {
+            (s.normal.dot((before - point).normalize_or_zero()).max(0.0), light.direction.dot(s.normal).max(0.0))
+        };
+        let (cosine, cosine_to_light) = match vertex {
+            Vertex::InMedium { .. } => (1.0, 1.0),
+            Vertex::OnSurface(s) => cosines(s),
+            Vertex::OnMaterial(s, _) => cosines(s),
+        };
+        let scattered = pdf * cosine / before.distance_squared(point);
+        let density = self.world.lights.density_of_beam(light.emitter);
+        let by_bounce = density * cosine_to_light / light.point.distance_squared(point);
+        // Where neither has a density nothing was connected.
+        if by_bounce > 0.0 { scattered / (scattered + by_bounce) } else { 1.0 }
+    }
+}

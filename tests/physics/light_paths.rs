@@ -1,0 +1,77 @@
+//! Paths that are connected to paths of the lights have the mean of those that are not, whatever lies between: the same scene by the estimators `thesis` and
+//! `equiangular`.
+
+use std::path::Path;
+
+use vdf::{
+    render::{Estimator, SamplerKind},
+    scene::{Emitter, IntegratorSettings, LoadOptions, Scene},
+};
+
+use crate::{
+    check::VOLPATH,
+    common::{Options, options, rendered},
+};
+
+/// The mean of the image and of each quarter, in each colour: all by one light or by all of them, by few events and by several. Of 16 pairs of renders
+/// each; 5 of their standard errors, with 30 degrees of freedom, are a false alarm of 2·10⁻⁵ each, of 4·10⁻³ over all.
+fn light_paths_bring_what_rays_find(spp: u32, pairs: u64, enough: f64) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/physics/light_paths.xml");
+    let all = Scene::load(&path, &LoadOptions::default()).expect("the scene loads");
+    type Keeps = fn(&Emitter) -> bool;
+    let kinds: [(&str, Keeps); 4] = [
+        ("all", |_| true),
+        ("point", |e| matches!(e, Emitter::Point { .. })),
+        ("spot", |e| matches!(e, Emitter::Spot { .. })),
+        ("projector", |e| matches!(e, Emitter::Projector { .. })),
+    ];
+    for ((name, keeps), max_depth) in kinds.into_iter().flat_map(|kind| [(kind, 3), (kind, 7)]) {
+        let mut scene = all.clone();
+        if name != "all" {
+            for surface in &mut scene.surfaces {
+                surface.radiance = None;
+            }
+        }
+        scene.emitters.retain(keeps);
+        scene.integrator = IntegratorSettings { max_depth: Some(max_depth), ..scene.integrator };
+        // Sums over the image and its quarters, in three colours.
+        let sums = |estimator, sampler, seed| {
+            let o = Options { integrator: VOLPATH, estimator, sampler, spp: Some(spp), seed: Some(seed), ..options() };
+            let mut sums = [[0.0; 3]; 5];
+            for (i, pixel) in rendered(&scene, &o).image.pixels.iter().enumerate() {
+                for part in [4, i % 16 / 8 + i / 128 * 2] {
+                    (0..3).for_each(|c| sums[part][c] += f64::from(pixel[c]));
+                }
+            }
+            sums
+        };
+        let pictures: Vec<_> = (0..pairs)
+            .map(|i| {
+                let thesis = sums(Estimator::Thesis, SamplerKind::Independent, 2 * i);
+                (thesis, sums(Estimator::Equiangular, SamplerKind::Sobol, 2 * i + 1))
+            })
+            .collect();
+        for (part, colour) in (0..5).flat_map(|part| [0, 1, 2].map(|colour| (part, colour))) {
+            let n = pairs as f64;
+            let level = pictures.iter().map(|(a, _)| a[part][colour]).sum::<f64>() / n;
+            let difference = |(a, b): &([[f64; 3]; 5], [[f64; 3]; 5])| (b[part][colour] - a[part][colour]) / level;
+            let mean = pictures.iter().map(difference).sum::<f64>() / n;
+            let squares = pictures.iter().map(|p| (difference(p) - mean).powi(2)).sum::<f64>();
+            let error = (squares / (n - 1.0) / n).sqrt();
+            println!("{name}, depth {max_depth}, part {part}, colour {colour}: {mean:.1e} ± {error:.1e}");
+            assert!(mean.abs() < 5.0 * error, "{name}, depth {max_depth}, part {part}: {mean} ± {error}");
+            assert!(part < 4 || error < enough, "{name}, depth {max_depth}: too noisy, {error}");
+        }
+    }
+}
+
+#[test]
+fn light_paths_bring_what_rays_find_in_short() {
+    light_paths_bring_what_rays_find(128, 16, 0.015);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn light_paths_bring_what_rays_find_for_long() {
+    light_paths_bring_what_rays_find(4096, 16, 0.002);
+}
