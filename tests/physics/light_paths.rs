@@ -19,15 +19,16 @@ fn light_paths_bring_what_rays_find(spp: u32, pairs: u64, enough: f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/physics/light_paths.xml");
     let all = Scene::load(&path, &LoadOptions::default()).expect("the scene loads");
     type Keeps = fn(&Emitter) -> bool;
-    let kinds: [(&str, Keeps); 4] = [
+    let kinds: [(&str, Keeps); 5] = [
         ("all", |_| true),
         ("point", |e| matches!(e, Emitter::Point { .. })),
         ("spot", |e| matches!(e, Emitter::Spot { .. })),
         ("projector", |e| matches!(e, Emitter::Projector { .. })),
+        ("lamps", |e| matches!(e, Emitter::Area { .. })),
     ];
     for ((name, keeps), max_depth) in kinds.into_iter().flat_map(|kind| [(kind, 3), (kind, 7)]) {
         let mut scene = all.clone();
-        if name != "all" {
+        if name != "all" && name != "lamps" {
             for surface in &mut scene.surfaces {
                 surface.radiance = None;
             }

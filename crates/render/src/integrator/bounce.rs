@@ -22,7 +22,11 @@ use vdf_scene::{Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
 
 use super::{Origin, Path, Tracer, Vertex, choose, to_f32, volpath::Event};
-use crate::{LightSample, PhaseFunction as _, RegionSet, Sampler, world::SurfacePoint};
+use crate::{
+    LightSample, PhaseFunction as _, RegionSet, Sampler,
+    lights::{Beam, LightRay},
+    world::SurfacePoint,
+};
 
 /// What a path has of its light path.
 #[derive(Clone, Copy, Debug)]
@@ -58,15 +62,23 @@ impl<R: Recorder> Tracer<'_, R> {
         !self.world.beam_regions.is_empty()
     }
 
-    /// A place where light is scattered first. Takes three numbers.
+    /// A place where light is scattered first. Takes as many numbers whichever emitter it comes from.
     #[inline(never)]
     fn draw_bounce(&self, sampler: &mut Sampler, counters: &mut Counters) -> Option<Bounce> {
         let lights = &self.world.lights;
         let (i, u) = choose(sampler.next_1d(), lights.beams().len())?;
         let beam = &lights.beams()[i];
-        let ray = self.ray(beam.position, beam.sample_direction(sampler.next_2d()), self.world.beam_regions[i].clone());
-        let direction = ray.direction;
-        let (place, point, cosine, kind) = match self.first_event(&mut Path::new(ray), -(-u).ln_1p(), counters) {
+        let of_place = if lights.numbers_of_origin() > 0 { sampler.next_2d() } else { [0.0; 2] };
+        let from_light = beam.sample(lights, [of_place, sampler.next_2d()])?;
+        let LightRay { origin, direction, .. } = from_light;
+        let mut regions = self.world.beam_regions[i].clone();
+        if origin != beam.position {
+            regions = self.world.media.at_end(&Segment::new(beam.position, origin), &regions);
+        }
+        let ray = self.ray(origin, direction, regions);
+        let mut path = Path::new(ray);
+        path.on_surface = !beam.is_point();
+        let (place, point, cosine, kind) = match self.first_event(&mut path, -(-u).ln_1p(), counters) {
             Event::Collision { point, medium, .. } => {
                 let (albedo, phase) = self.world.media.scattering(medium, point);
                 (Place::InMedium { point, albedo, phase }, point, 1.0, QueryKind::Spatial)
@@ -76,15 +88,38 @@ impl<R: Recorder> Tracer<'_, R> {
             }
             Event::Arrival { surface: None, .. } => return None,
         };
-        let mut light = lights.seen_from(point, &lights.sample_point(beam.emitter, [0.0; 2])?)?;
-        let distance2 = point.distance_squared(beam.position);
-        let density = lights.density_of_beam(beam.emitter) * cosine / distance2;
+        let light = self.light_of_ray(beam, &from_light, point)?;
+        let distance2 = point.distance_squared(light.point);
+        let density = lights.density_of_beam(beam.emitter, distance2, light.pdf) * cosine / distance2;
+        let kind = if light.on_surface && kind == QueryKind::Spatial { QueryKind::OnLight } else { kind };
         let query = ShadowQuery { from: point, to: light.point, emitter: beam.emitter, kind };
-        if !(density > 0.0 && density.is_finite() && self.visibility.unoccluded(&query, counters)) {
-            return None;
-        }
-        light.weight *= to_f32(distance2 / (beam.density * lights.count() as f64)) * lights.beams().len() as f32;
-        Some(Bounce { place, light, density })
+        let is_lit = density > 0.0 && density.is_finite() && self.visibility.unoccluded(&query, counters);
+        is_lit.then_some(Bounce { place, light, density })
+    }
+
+    /// What a ray from an emitter, which starts there, brings to `point`; its weight is what is scattered at the point over the cosine there and the density of the ray.
+    #[inline]
+    fn light_of_ray(&self, beam: &Beam, ray: &LightRay, point: DVec3) -> Option<LightSample> {
+        let lights = &self.world.lights;
+        let choices = lights.beams().len() as f64;
+        let Some((normal, radiance)) = ray.surface else {
+            let light = lights.seen_from(point, &lights.sample_point(beam.emitter, [0.0; 2])?)?;
+            let distance2 = point.distance_squared(light.point);
+            let density = lights.density_of_beam(beam.emitter, distance2, light.pdf);
+            return Some(LightSample { weight: light.weight * to_f32(distance2 / density), ..light });
+        };
+        let d = ray.origin - point;
+        let distance = d.length();
+        let direction = d / distance;
+        let cosine = -normal.dot(direction);
+        Some(LightSample {
+            emitter: beam.emitter,
+            point: ray.origin,
+            direction,
+            weight: radiance * to_f32(beam.throughput() * choices),
+            pdf: lights.pdf_area(beam.emitter, distance, cosine),
+            on_surface: true,
+        })
     }
 
     /// The light that comes to an event by way of the path's light path.
@@ -163,28 +198,36 @@ impl<R: Recorder> Tracer<'_, R> {
         }
     }
 
-    /// The weight of what an event gets straight from `light`, which has no density, where the event before it was connected to a light path.
+    /// p cos θ/d² at an event that a path comes to from this origin; infinite where no light path could be at the event.
     #[inline]
-    pub(super) fn weight_beside_bounce(
-        &self,
-        origin: &Origin,
-        point: DVec3,
-        vertex: &Vertex,
-        light: &LightSample,
-    ) -> f64 {
-        let &Origin::Scattering { point: before, pdf, connected: true } = origin else { return 1.0 };
-        let cosines = |s: &SurfacePoint| {
-            (s.normal.dot((before - point).normalize_or_zero()).max(0.0), light.direction.dot(s.normal).max(0.0))
+    pub(super) fn density_of_arrival(&self, origin: &Origin, point: DVec3, vertex: &Vertex) -> f64 {
+        let &Origin::Scattering { point: before, pdf, connected: true, .. } = origin else { return f64::INFINITY };
+        let (back, distance2) = (before - point, before.distance_squared(point));
+        let cosine = match vertex {
+            Vertex::InMedium { .. } => 1.0,
+            Vertex::OnSurface(s) => s.normal.dot(back).max(0.0) / distance2.sqrt(),
+            Vertex::OnMaterial(s, _) => s.normal.dot(back).max(0.0) / distance2.sqrt(),
         };
-        let (cosine, cosine_to_light) = match vertex {
-            Vertex::InMedium { .. } => (1.0, 1.0),
-            Vertex::OnSurface(s) => cosines(s),
-            Vertex::OnMaterial(s, _) => cosines(s),
-        };
-        let scattered = pdf * cosine / before.distance_squared(point);
-        let density = self.world.lights.density_of_beam(light.emitter);
-        let by_bounce = density * cosine_to_light / light.point.distance_squared(point);
-        // Where neither has a density nothing was connected.
-        if by_bounce > 0.0 { scattered / (scattered + by_bounce) } else { 1.0 }
+        pdf * cosine / distance2
     }
+
+    /// The weight of what an event with this density of arrival gets straight from `light`.
+    #[inline]
+    pub(super) fn weight_beside_bounce(&self, arrival: f64, point: DVec3, vertex: &Vertex, light: &LightSample) -> f64 {
+        let cosine = match vertex {
+            Vertex::InMedium { .. } => 1.0,
+            Vertex::OnSurface(s) => light.direction.dot(s.normal).max(0.0),
+            Vertex::OnMaterial(s, _) => light.direction.dot(s.normal).max(0.0),
+        };
+        let distance2 = light.point.distance_squared(point);
+        let of_direction = self.world.lights.density_of_beam(light.emitter, distance2, light.pdf);
+        share_beside_bounce(arrival, of_direction * cosine / distance2)
+    }
+}
+
+/// The share of an estimate with density `arrival` beside that of a light path.
+#[inline]
+pub(super) fn share_beside_bounce(arrival: f64, by_bounce: f64) -> f64 {
+    // Where no light path can be, all of it; and where neither has a density nothing was connected.
+    if arrival.is_finite() && by_bounce > 0.0 { arrival / (arrival + by_bounce) } else { 1.0 }
 }

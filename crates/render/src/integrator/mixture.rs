@@ -80,28 +80,29 @@ impl<R: Recorder> Tracer<'_, R> {
                     (Vertex::OnSurface(surface), surface.point, regions)
                 }
             };
-            let mut light =
-                self.direct_light(point, &vertex, &regions, &path.origin, place.as_ref(), sampler, counters);
+            let arrival = self.density_of_arrival(&path.origin, point, &vertex);
+            let mut light = self.direct_light(point, &vertex, &regions, arrival, place.as_ref(), sampler, counters);
             let connected = self.connects(&path, path.depth);
             if connected {
                 light += self.light_by_bounce(&mut path, point, &vertex, &regions, sampler, counters);
             }
             path.radiance += path.throughput * light;
             let u = sampler.next_2d();
-            let (to, pdf) = match &vertex {
+            let (to, pdf, cosine) = match &vertex {
                 Vertex::InMedium { phase, .. } => {
                     path.on_surface = false;
                     let to = phase.sample_direction(direction, u);
-                    (to, phase.pdf_direction(direction, to))
+                    (to, phase.pdf_direction(direction, to), 1.0)
                 }
                 Vertex::OnSurface(surface) => {
                     path.on_surface = true;
                     path.throughput *= surface.reflectance;
-                    sample_diffuse(surface.normal, u)
+                    let (to, pdf) = sample_diffuse(surface.normal, u);
+                    (to, pdf, surface.normal.dot(to))
                 }
                 Vertex::OnMaterial(..) => break,
             };
-            path.origin = Origin::Scattering { point, pdf, connected };
+            path.origin = Origin::Scattering { point, pdf, connected, arrival, cosine };
             path.ray = self.ray(point, to, regions);
         }
         path.radiance

@@ -18,7 +18,7 @@ use vdf_geometry::{Hit, Segment};
 use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
-use self::bounce::LightPath;
+use self::bounce::{LightPath, share_beside_bounce};
 pub use self::kind::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 pub(crate) use self::raymarch::evenly;
 use crate::{
@@ -66,11 +66,22 @@ enum Origin {
     Scattering {
         point: DVec3,
         pdf: f64,
-        /// Whether it was connected to a [`Bounce`](bounce::Bounce), too.
+        /// Whether it was connected to a light path, too.
         connected: bool,
+        /// [`Tracer::density_of_arrival`] there.
+        arrival: f64,
+        /// The cosine of the ray's angle to the normal, or 1 in a medium.
+        cosine: f64,
     },
     /// A mirror or a lens, which sends light in one direction only: no emitter sampling competes.
     Delta,
+}
+
+impl Origin {
+    /// An event of a path without light paths.
+    const fn scattering(point: DVec3, pdf: f64) -> Self {
+        Self::Scattering { point, pdf, connected: false, arrival: f64::INFINITY, cosine: 1.0 }
+    }
 }
 
 /// A path under way from the camera.
@@ -257,11 +268,11 @@ impl<R: Recorder> Tracer<'_, R> {
         }
         let Some(surface) = self.light_at_end(path, surface) else { return false };
         let vertex = Vertex::OnSurface(surface);
-        let direct = self.direct_light(surface.point, &vertex, &regions, &path.origin, None, sampler, counters);
+        let direct = self.direct_light(surface.point, &vertex, &regions, f64::INFINITY, None, sampler, counters);
         path.radiance += path.throughput * direct;
         let (direction, pdf) = sample_diffuse(surface.normal, sampler.next_2d());
         path.throughput *= surface.reflectance;
-        path.origin = Origin::Scattering { point: surface.point, pdf, connected: false };
+        path.origin = Origin::scattering(surface.point, pdf);
         path.on_surface = true;
         path.ray = self.ray(surface.point, direction, regions);
         true
@@ -279,8 +290,8 @@ impl<R: Recorder> Tracer<'_, R> {
         self.may_scatter(path.depth).then_some(surface)
     }
 
-    /// Next-event estimation where direction sampling may find the same light, weighted by the power heuristic, or a light path may bring it, for an event of a
-    /// path from this origin. `place` is a place on an emitter if one is drawn already.
+    /// Next-event estimation where direction sampling may find the same light, weighted by the power heuristic, or a light path may bring it. `arrival` is
+    /// [`Tracer::density_of_arrival`] at the event; `place` a place on an emitter if one is drawn already.
     #[inline]
     #[allow(clippy::too_many_arguments, reason = "what an event has and what a path has")]
     fn direct_light(
@@ -288,7 +299,7 @@ impl<R: Recorder> Tracer<'_, R> {
         point: DVec3,
         vertex: &Vertex,
         regions: &RegionSet,
-        origin: &Origin,
+        arrival: f64,
         place: Option<&EmitterPoint>,
         sampler: &mut Sampler,
         counters: &mut Counters,
@@ -299,14 +310,11 @@ impl<R: Recorder> Tracer<'_, R> {
         };
         let Some(light) = light else { return Rgb::ZERO };
         let Some(arriving) = self.connect(point, vertex, regions, &light, flight, counters) else { return Rgb::ZERO };
-        let weight = if light.pdf > 0.0 {
-            power_heuristic(light.pdf, arriving.pdf)
-        } else if arriving.is_straight {
-            // A point emitter is found by no scattered ray.
-            self.weight_beside_bounce(origin, point, vertex, &light)
-        } else {
-            1.0
-        };
+        // A point emitter is found by no scattered ray.
+        let mut weight = if light.pdf > 0.0 { power_heuristic(light.pdf, arriving.pdf) } else { 1.0 };
+        if arriving.is_straight && arrival.is_finite() {
+            weight *= self.weight_beside_bounce(arrival, point, vertex, &light);
+        }
         arriving.value * to_f32(weight)
     }
 
@@ -443,10 +451,13 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline]
     fn emitted(&self, surface: &SurfacePoint, direction: DVec3, origin: &Origin) -> Rgb {
         match (origin, surface.emitter) {
-            (Origin::Scattering { point, pdf, .. }, Some(emitter)) if surface.emitted != Rgb::ZERO => {
-                let cos_theta = -direction.dot(surface.normal);
-                let light_pdf = self.world.lights.pdf_area(emitter, point.distance(surface.point), cos_theta);
-                surface.emitted * to_f32(power_heuristic(*pdf, light_pdf))
+            (Origin::Scattering { point, pdf, arrival, cosine, .. }, Some(emitter)) if surface.emitted != Rgb::ZERO => {
+                let lights = &self.world.lights;
+                let (distance, cos_theta) = (point.distance(surface.point), -direction.dot(surface.normal));
+                let (light_pdf, distance2) = (lights.pdf_area(emitter, distance, cos_theta), distance * distance);
+                let weight = power_heuristic(*pdf, light_pdf);
+                let by_bounce = lights.density_of_beam(emitter, distance2, light_pdf) * cosine.max(0.0) / distance2;
+                surface.emitted * to_f32(weight * share_beside_bounce(*arrival, by_bounce))
             }
             _ => surface.emitted,
         }

@@ -70,10 +70,11 @@ impl<R: Recorder> Tracer<'_, R> {
         path.radiance += path.throughput * self.emitted(surface, path.ray.direction, &path.origin);
         let material = &self.world.materials[shading.material as usize].material;
         let may_scatter = self.may_scatter(path.depth + 1);
-        let mut connected = false;
+        let (mut connected, mut arrival) = (false, f64::INFINITY);
         if may_scatter && material.has_smooth_lobes() {
             let vertex = Vertex::OnMaterial(surface, shading);
-            let mut light = self.direct_light(surface.point, &vertex, &regions, &path.origin, None, sampler, counters);
+            arrival = self.density_of_arrival(&path.origin, surface.point, &vertex);
+            let mut light = self.direct_light(surface.point, &vertex, &regions, arrival, None, sampler, counters);
             connected = self.connects(path, path.depth + 1);
             if connected {
                 light += self.light_by_bounce(path, surface.point, &vertex, &regions, sampler, counters);
@@ -95,14 +96,25 @@ impl<R: Recorder> Tracer<'_, R> {
         path.compression *= (sample.eta * sample.eta) as f32;
         match sample.lobe {
             // Nothing has happened: what draws the direction, and how deep the path is, stays.
-            Lobe::Null => {}
+            Lobe::Null => {
+                // But no light path gets through.
+                if let Origin::Scattering { arrival, .. } = &mut path.origin {
+                    *arrival = f64::INFINITY;
+                }
+            }
             Lobe::Smooth | Lobe::Delta => {
                 path.depth += 1;
                 if !may_scatter {
                     return false;
                 }
                 path.origin = match sample.lobe {
-                    Lobe::Smooth => Origin::Scattering { point: surface.point, pdf: sample.pdf, connected },
+                    Lobe::Smooth => Origin::Scattering {
+                        point: surface.point,
+                        pdf: sample.pdf,
+                        connected,
+                        arrival,
+                        cosine: direction.dot(surface.normal),
+                    },
                     _ => Origin::Delta,
                 };
             }

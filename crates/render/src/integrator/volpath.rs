@@ -47,11 +47,11 @@ impl<R: Recorder> Tracer<'_, R> {
                     let (albedo, phase) = self.world.media.scattering(medium, point);
                     path.throughput *= albedo;
                     let vertex = Vertex::InMedium { phase, direction: path.ray.direction };
-                    let direct = self.direct_light(point, &vertex, &regions, &path.origin, None, sampler, counters);
+                    let direct = self.direct_light(point, &vertex, &regions, f64::INFINITY, None, sampler, counters);
                     path.radiance += path.throughput * direct;
                     let direction = phase.sample_direction(path.ray.direction, sampler.next_2d());
                     let pdf = phase.pdf_direction(path.ray.direction, direction);
-                    path.origin = Origin::Scattering { point, pdf, connected: false };
+                    path.origin = Origin::scattering(point, pdf);
                     path.on_surface = false;
                     path.ray = self.ray(point, direction, regions);
                 }

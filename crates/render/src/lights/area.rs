@@ -58,6 +58,19 @@ pub(super) struct AreaPoint {
     radiance: Rgb,
 }
 
+impl AreaPoint {
+    /// Where a ray to the point ends.
+    #[inline]
+    pub(super) fn lifted(&self) -> DVec3 {
+        self.point + self.normal * self.lift
+    }
+
+    /// What leaves it.
+    pub(super) const fn radiance(&self) -> Rgb {
+        self.radiance
+    }
+}
+
 impl AreaLight {
     pub(super) fn new(surface: &Surface) -> Self {
         let Surface { triangles, curved, attributes, radiance, .. } = surface;
@@ -93,8 +106,14 @@ impl AreaLight {
         self.ball.as_ref()
     }
 
-    fn area(&self) -> f64 {
+    /// The area of all of it.
+    pub(super) fn area(&self) -> f64 {
         self.cumulative_area.last().copied().unwrap_or(0.0)
+    }
+
+    /// A place just before the surface; `None` if there is no area.
+    pub(super) fn place(&self) -> Option<DVec3> {
+        Some(self.sample([0.5; 2])?.lifted())
     }
 
     /// A point, uniform over the area. Nothing can be sampled on an emitter without area.
@@ -137,7 +156,7 @@ impl AreaLight {
         place: &AreaPoint,
         choices: f64,
     ) -> Option<LightSample> {
-        let AreaPoint { point, normal, lift, radiance } = *place;
+        let AreaPoint { point, normal, radiance, .. } = *place;
         let d = point - from;
         let distance2 = d.length_squared();
         let direction = d / distance2.sqrt();
@@ -148,7 +167,7 @@ impl AreaLight {
         let pdf = distance2 / (cos_theta * self.area() * choices);
         Some(LightSample {
             emitter,
-            point: point + normal * lift,
+            point: place.lifted(),
             direction,
             weight: radiance * (1.0 / pdf) as f32,
             pdf,

@@ -12,7 +12,7 @@ mod spot;
 use glam::DVec3;
 use vdf_scene::{Emitter, Rgb, Scene};
 
-pub(crate) use self::beam::Beam;
+pub(crate) use self::beam::{Beam, LightRay};
 use self::{
     area::{AreaLight, AreaPoint},
     envmap::EnvmapLight,
@@ -37,10 +37,11 @@ pub struct Lights {
     reach: f64,
     may_be_met: bool,
     numbers_of_place: u32,
-    /// Of each that is a point.
+    /// Of each that rays are sent from.
     beams: Vec<Beam>,
-    /// By number of emitter: with what density a ray from a light leaves it in one of its directions, over that with which the emitter itself is sampled; 0 if it is no point.
-    density_of_beam: Vec<f64>,
+    numbers_of_origin: u32,
+    /// By number of emitter.
+    beam_of_emitter: Vec<Option<usize>>,
 }
 
 #[derive(Debug)]
@@ -156,12 +157,14 @@ impl Lights {
             Light::Point { position, .. } => Some(Beam::sphere(i, *position)),
             Light::Spot(light) => Beam::cone(i, light.position, light.direction, light.cutoff),
             Light::Projector(light) => Beam::cone(i, light.position, light.direction, light.angle()),
-            _ => None,
+            Light::Area(light) => light.place().map(|position| Beam::surface(i, position, light.area())),
+            Light::Directional { .. } | Light::Constant { .. } | Light::Envmap(_) => None,
         };
         let beams: Vec<_> = lights.iter().enumerate().filter_map(beam).collect();
-        let mut density_of_beam = vec![0.0; lights.len()];
-        for beam in &beams {
-            density_of_beam[beam.emitter] = beam.density * lights.len() as f64 / beams.len() as f64;
+        let numbers_of_origin = if beams.iter().all(Beam::is_point) { 0 } else { 2 };
+        let mut beam_of_emitter = vec![None; lights.len()];
+        for (i, beam) in beams.iter().enumerate() {
+            beam_of_emitter[beam.emitter] = Some(i);
         }
         Self {
             lights,
@@ -174,7 +177,8 @@ impl Lights {
             may_be_met,
             numbers_of_place,
             beams,
-            density_of_beam,
+            numbers_of_origin,
+            beam_of_emitter,
         }
     }
 
@@ -216,17 +220,35 @@ impl Lights {
         self.numbers_of_place
     }
 
-    /// The directions that rays leave the points, spots and projectors in.
+    /// The emitters that rays are sent from: all but those that are infinitely far away.
     #[inline]
     pub(crate) fn beams(&self) -> &[Beam] {
         &self.beams
     }
 
-    /// The density of a direction from an emitter, per steradian and for a ray of any of [`Lights::beams`], over the probability of the emitter's own
-    /// samples; 0 if no ray leaves it.
+    /// So many random numbers are set aside for a place to send a ray from.
     #[inline]
-    pub(crate) fn density_of_beam(&self, emitter: usize) -> f64 {
-        self.density_of_beam[emitter]
+    pub(crate) const fn numbers_of_origin(&self) -> u32 {
+        self.numbers_of_origin
+    }
+
+    /// A point just before an emitter's surface, uniform over its area, the unit normal there and the radiance.
+    #[inline]
+    fn surface_point(&self, emitter: usize, u: [f64; 2]) -> Option<(DVec3, DVec3, Rgb)> {
+        let Light::Area(light) = &self.lights[emitter] else { return None };
+        let place = light.sample(u)?;
+        Some((place.lifted(), place.normal, place.radiance()))
+    }
+
+    /// The density per steradian of a ray, from one of [`Lights::beams`], to a point at this squared distance, over the density with which the point's own sample of
+    /// the emitter, of density `pdf` per steradian there, starts at the same place; 0 if no ray leaves the emitter.
+    #[inline]
+    pub(crate) fn density_of_beam(&self, emitter: usize, distance2: f64, pdf: f64) -> f64 {
+        let Some(i) = self.beam_of_emitter[emitter] else { return 0.0 };
+        let beam = &self.beams[i];
+        // `pdf` has the choice of the emitter in it; a point has none.
+        let choices = if beam.is_point() { self.lights.len() as f64 } else { 1.0 };
+        beam.density(distance2, pdf) * choices / self.beams.len() as f64
     }
 
     /// How many emitters there are.
