@@ -6,8 +6,8 @@ pub mod statistics;
 use vdf::{
     geometry::Triangle,
     render::{
-        Estimator, Integrator, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering, Roulette,
-        SamplerKind, TransmittanceEstimator,
+        Estimator, Integrator, LightPaths, PrepareOptions, PreparedScene, Quiet, RenderError, RenderOptions, Rendering,
+        Roulette, SamplerKind, TransmittanceEstimator,
     },
     scene::{
         Boundary, Bsdf, ComponentFormat, Emitter, FilmSettings, IntegratorSettings, LoadOptions, Medium, MediumId,
@@ -74,6 +74,8 @@ pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
         threads,
         crop,
         segment_first,
+        // Whether they pay or not, they are to be right.
+        light_paths: LightPaths::Always,
         ..RenderOptions::default()
     };
     PreparedScene::new(scene.clone(), &prepare, &Quiet)?.render(&options, &Quiet)

@@ -3,9 +3,11 @@
 
 use std::path::Path;
 
+use glam::{DVec3, Vec3};
 use vdf::{
+    geometry::Triangle,
     render::{Estimator, SamplerKind},
-    scene::{Emitter, IntegratorSettings, LoadOptions, Scene},
+    scene::{Bsdf, Emitter, IntegratorSettings, LoadOptions, Rgb, Scene, Surface},
 };
 
 use crate::{
@@ -75,4 +77,25 @@ fn light_paths_bring_what_rays_find_in_short() {
 #[ignore = "minutes"]
 fn light_paths_bring_what_rays_find_for_long() {
     light_paths_bring_what_rays_find(4096, 16, 0.002);
+}
+
+/// A light that lies on a wall is hidden by it from everywhere: no ray of it brings what no query lets through.
+#[test]
+fn a_light_on_a_wall_sends_nothing() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/physics/light_paths.xml");
+    let mut scene = Scene::load(&path, &LoadOptions::default()).expect("the scene loads");
+    for surface in &mut scene.surfaces {
+        surface.radiance = None;
+    }
+    scene.emitters = vec![Emitter::Point { position: DVec3::new(0.1, -0.25, 0.2), intensity: Rgb::ONE }];
+    let [a, b, c, d] = [(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)].map(|(x, z)| Vec3::new(x, -0.25, z));
+    scene.surfaces.push(Surface {
+        triangles: vec![Triangle::new(a, b, c), Triangle::new(a, c, d)],
+        bsdf: Bsdf::lambertian(Rgb::ONE, Rgb::ONE),
+        ..Surface::default()
+    });
+    for estimator in Estimator::ALL {
+        let o = Options { integrator: VOLPATH, estimator, spp: Some(16), ..options() };
+        assert!(rendered(&scene, &o).image.pixels.iter().all(|p| *p == Rgb::ZERO), "{estimator:?}");
+    }
 }

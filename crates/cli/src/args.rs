@@ -86,9 +86,12 @@ pub(crate) struct RenderArgs {
     /// When paths are ended by chance: as in Mitsuba 3, or earlier, as in the thesis's renderer; the mean is the same
     #[arg(long, value_enum, default_value_t = RouletteName::Standard)]
     pub(crate) roulette: RouletteName,
-    /// How light is looked for: as in the thesis, or with distances and directions drawn towards point lights, too, which is less noisy; "lit" looks only where a ray is lit; all of the same mean
+    /// How light is looked for: as in the thesis, or with distances drawn towards point lights, too, which is less noisy; "lit" looks only where a ray is lit; all of the same mean
     #[arg(long, value_enum, default_value_t = EstimatorName::Equiangular)]
     pub(crate) estimator: EstimatorName,
+    /// Connect paths to rays from the lights (volpath, not with the estimator thesis): less noise where light comes from other surfaces; auto tries it on some paths
+    #[arg(long, value_enum, default_value_t = LightPathsName::Auto)]
+    pub(crate) light_paths: LightPathsName,
     /// How the samples of a pixel are spread: each for itself, or so that they fill it, which is less noisy
     #[arg(long, value_enum, default_value_t = SamplerName::Sobol)]
     pub(crate) sampler: SamplerName,
@@ -187,6 +190,13 @@ pub(crate) enum RouletteName {
 pub(crate) enum TransmittanceName {
     Analytic,
     Analog,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LightPathsName {
+    Auto,
+    Always,
+    Never,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

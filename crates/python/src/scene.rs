@@ -14,8 +14,8 @@ use pyo3::{
 };
 use vdf_image::Image;
 use vdf_render::{
-    Estimator, FilmPart, Integrator, Layer, Layers, LiveFilm, NoiseLimit, PrepareOptions, PreparedScene, RenderError,
-    RenderOptions, Roulette, SamplerKind, SegmentSamples, Statistics, TransmittanceEstimator,
+    Estimator, FilmPart, Integrator, Layer, Layers, LightPaths, LiveFilm, NoiseLimit, PrepareOptions, PreparedScene,
+    RenderError, RenderOptions, Roulette, SamplerKind, SegmentSamples, Statistics, TransmittanceEstimator,
 };
 use vdf_scene::{LoadOptions, PixelRect, Scene, SceneSource};
 use vdf_scenes::builtin;
@@ -169,7 +169,7 @@ impl PyScene {
     ///
     /// Raises ValueError if an option is not usable.
     #[pyo3(signature = (*, spp = None, seed = None, method = None, integrator = "volpath", samples_per_segment = None,
-        estimator = "equiangular", sampler = "sobol", transmittance = "analytic", roulette = "standard", voxel = None,
+        estimator = "equiangular", light_paths = "auto", sampler = "sobol", transmittance = "analytic", roulette = "standard", voxel = None,
         crop = None, layers = None, noise = None, threads = None))]
     #[expect(clippy::too_many_arguments, reason = "they have names in Python")]
     fn render(
@@ -181,6 +181,7 @@ impl PyScene {
         integrator: &str,
         samples_per_segment: Option<Samples>,
         estimator: &str,
+        light_paths: &str,
         sampler: &str,
         transmittance: &str,
         roulette: &str,
@@ -205,6 +206,7 @@ impl PyScene {
             transmittance: named("transmittance", transmittance, &transmittances, TransmittanceEstimator::name)?,
             roulette: named("roulette", roulette, &roulettes, Roulette::name)?,
             estimator: named("estimator", estimator, &Estimator::ALL, Estimator::name)?,
+            light_paths: named("light_paths", light_paths, &LightPaths::ALL, LightPaths::name)?,
             sampler: named("sampler", sampler, &SamplerKind::ALL, SamplerKind::name)?,
             spp: spp.or_else(|| noise.map(|_| NoiseLimit::MOST_SAMPLES)),
             seed,

@@ -7,7 +7,8 @@ use vdf_scene::{PixelRect, Rgb};
 use vdf_visibility::{Counters, NoRecorder, Recorder, Visibility};
 
 use crate::{
-    Camera, FilterSample, Integrator, PixelFilter, PreparedScene, Progress, RenderOptions, Sampler, SamplerKind,
+    Camera, Estimator, FilterSample, Integrator, LightPaths, PixelFilter, PreparedScene, Progress, RenderOptions,
+    Sampler, SamplerKind,
     film::{Feature, tile_rects},
     integrator::{PathRay, Tracer},
 };
@@ -115,9 +116,11 @@ impl<'a> Job<'a> {
         'a: 'b,
     {
         let visibility = || self.prepared.visibility();
+        let light_paths = self.has_light_paths();
+        let recording = |recorder| self.tracer_with(visibility().recorded(recorder), light_paths, progress);
         PathTracer {
-            tracer: self.tracer_with(visibility().segment_first(self.options.segment_first), progress),
-            recording: recorder.map(|recorder| self.tracer_with(visibility().recorded(recorder), progress)),
+            tracer: self.tracer_with(visibility().segment_first(self.options.segment_first), light_paths, progress),
+            recording: recorder.map(recording),
             camera: self.camera,
             filter: self.filter,
             integrator: self.options.integrator,
@@ -126,11 +129,28 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn tracer_with<'b, R>(&self, visibility: Visibility<'b, R>, progress: &'b dyn Progress) -> Tracer<'b, R>
+    /// Whether paths are connected to paths of the lights: where that can be done, and pays.
+    fn has_light_paths(&self) -> bool {
+        let world = self.prepared.world();
+        let may = self.options.light_paths != LightPaths::Never
+            && self.options.integrator == Integrator::Volpath
+            && self.options.estimator != Estimator::Thesis
+            && !world.lights.beams().is_empty()
+            && !world.media.is_chromatic();
+        may && (self.options.light_paths == LightPaths::Always || world.light_paths_pay(self.prepared.scene()))
+    }
+
+    fn tracer_with<'b, R>(
+        &self,
+        visibility: Visibility<'b, R>,
+        light_paths: bool,
+        progress: &'b dyn Progress,
+    ) -> Tracer<'b, R>
     where
         'a: 'b,
     {
         Tracer {
+            light_paths,
             world: self.prepared.world(),
             visibility,
             settings: self.prepared.scene().integrator,

@@ -38,6 +38,7 @@ mod filter;
 mod frame;
 mod integrator;
 mod job;
+mod light_paths;
 mod lights;
 mod media;
 mod options;
@@ -63,7 +64,8 @@ pub use job::{Job, PathTracer};
 pub use lights::{LightSample, Lights};
 pub use media::{FreeFlight, Homogeneous, Media, MediumInterval, MediumIntervals, RegionSet, ShortFlight};
 pub use options::{
-    Estimator, GridExtent, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator, check_voxel_size,
+    Estimator, GridExtent, LightPaths, PrepareOptions, RenderOptions, Roulette, TransmittanceEstimator,
+    check_voxel_size,
 };
 pub use phase::PhaseFunction;
 pub use pilot::{Choice, Declined, Measured, QueryCost, ThreadTime, Work};

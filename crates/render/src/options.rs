@@ -84,6 +84,33 @@ impl Roulette {
     }
 }
 
+/// Whether the events of a path are connected to the first event of a ray from a light (`volpath` with another estimator than `thesis`). All images have the same mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightPaths {
+    /// Where that pays in a look at some paths of the scene, the same for all of its renders.
+    #[default]
+    Auto,
+    /// Wherever a light is in the scene that is not infinitely far away.
+    Always,
+    /// Nowhere.
+    Never,
+}
+
+impl LightPaths {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Always, Self::Never];
+
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Always => "always",
+            Self::Never => "never",
+        }
+    }
+}
+
 /// What a voxel grid covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GridExtent {
@@ -168,6 +195,8 @@ pub struct RenderOptions {
     pub roulette: Roulette,
     /// How the integrator draws what leads to light.
     pub estimator: Estimator,
+    /// Whether events are connected to paths of the lights.
+    pub light_paths: LightPaths,
     /// How the samples of a pixel are spread.
     pub sampler: SamplerKind,
     /// Samples per pixel; by default the scene's.

@@ -119,6 +119,7 @@ pub(crate) fn empty_film(job: &Job<'_>, name: &str) -> Result<Film, RenderError>
         transmittance: options.transmittance.name().to_owned(),
         roulette: options.roulette.name().to_owned(),
         estimator: options.estimator.name().to_owned(),
+        light_paths: options.light_paths.name().to_owned(),
         sampler: options.sampler.name().to_owned(),
         seed: job.seed(),
         full_size: [scene.film.width, scene.film.height],

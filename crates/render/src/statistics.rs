@@ -40,6 +40,8 @@ pub struct Statistics {
     pub roulette: &'static str,
     /// How the integrator drew what leads to light.
     pub estimator: &'static str,
+    /// Whether events were to be connected to paths of the lights.
+    pub light_paths: &'static str,
     /// How the samples of a pixel were spread.
     pub sampler: &'static str,
     /// Width and height of the image in pixels.
@@ -177,6 +179,7 @@ impl Statistics {
             transmittance: options.transmittance.name(),
             roulette: options.roulette.name(),
             estimator: options.estimator.name(),
+            light_paths: options.light_paths.name(),
             sampler: options.sampler.name(),
             size: job.size(),
             spp,

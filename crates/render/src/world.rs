@@ -2,7 +2,7 @@
 
 use std::{
     f64::consts::{PI, TAU},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use glam::{DVec3, Vec2, dvec3, vec2};
@@ -13,6 +13,7 @@ use vdf_visibility::LightShape;
 use crate::{
     GridExtent, RegionSet,
     bsdf::{Material, MaterialPoint},
+    light_paths,
     lights::Lights,
     media::Media,
     others::{CurvedPoint, Met, OtherShapes, TrianglePlace},
@@ -45,6 +46,8 @@ pub struct World {
     pub(crate) materials: Vec<Shading>,
     surface_of_triangle: Vec<u32>,
     surfaces: Vec<SurfaceData>,
+    /// Whether light paths pay, once somebody has asked.
+    light_paths_pay: OnceLock<bool>,
 }
 
 #[derive(Clone, Debug)]
@@ -218,7 +221,13 @@ impl World {
             materials,
             surface_of_triangle,
             surfaces,
+            light_paths_pay: OnceLock::new(),
         }
+    }
+
+    /// Whether it pays that paths are connected to paths of the lights, in the scene that this is of. Cost: see [`light_paths`], at first; then nothing.
+    pub(crate) fn light_paths_pay(&self, scene: &Scene) -> bool {
+        *self.light_paths_pay.get_or_init(|| light_paths::pay(scene, self))
     }
 
     /// What a voxel grid of this extent covers.

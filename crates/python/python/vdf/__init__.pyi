@@ -51,6 +51,7 @@ class Scene:
         integrator: Literal["volpath", "raymarch"] = "volpath",
         samples_per_segment: int | Literal["auto"] | None = None,
         estimator: Literal["thesis", "equiangular", "lit"] = "equiangular",
+        light_paths: Literal["auto", "always", "never"] = "auto",
         sampler: Literal["independent", "sobol"] = "sobol",
         transmittance: Literal["analytic", "analog"] = "analytic",
         roulette: Literal["standard", "thesis"] = "standard",

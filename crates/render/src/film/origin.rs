@@ -20,6 +20,8 @@ pub struct FilmOrigin {
     pub roulette: String,
     /// Name of the estimator of light.
     pub estimator: String,
+    /// Name of the use of light paths.
+    pub light_paths: String,
     /// How the samples of a pixel are spread.
     pub sampler: String,
     /// Seed of the render.
@@ -50,6 +52,7 @@ impl FilmOrigin {
             transmittance: "analytic".to_owned(),
             roulette: "standard".to_owned(),
             estimator: "thesis".to_owned(),
+            light_paths: "auto".to_owned(),
             sampler: "independent".to_owned(),
             seed: 0,
             full_size: [width, height],
@@ -90,6 +93,7 @@ impl FilmOrigin {
             transmittance,
             roulette,
             estimator,
+            light_paths,
             sampler,
             seed,
             full_size,
@@ -105,6 +109,7 @@ impl FilmOrigin {
         differ("the estimator of transmittance", transmittance, &other.transmittance)?;
         differ("the roulette", roulette, &other.roulette)?;
         differ("the estimator of light", estimator, &other.estimator)?;
+        differ("the use of light paths", light_paths, &other.light_paths)?;
         differ("the sampler", sampler, &other.sampler)?;
         differ("the seed", seed, &other.seed)?;
         let size = |[width, height]: [u32; 2]| format!("{width} x {height}");

@@ -141,6 +141,7 @@ fn strangers_are_refused_with_the_field() {
         ("transmittance", with(|o| o.transmittance = "analog".to_owned())),
         ("roulette", with(|o| o.roulette = "thesis".to_owned())),
         ("estimator of light", with(|o| o.estimator = "equiangular".to_owned())),
+        ("light paths", with(|o| o.light_paths = "never".to_owned())),
         ("sampler", with(|o| o.sampler = "sobol".to_owned())),
         ("seed", with(|o| o.seed = 8)),
         ("size", with(|o| o.full_size = [18, 1])),

@@ -56,12 +56,6 @@ enum Place {
 }
 
 impl<R: Recorder> Tracer<'_, R> {
-    /// Whether there is a light that a ray can be sent from, in proportion to what it radiates.
-    #[inline]
-    pub(super) fn has_light_paths(&self) -> bool {
-        !self.world.beam_regions.is_empty()
-    }
-
     /// A place where light is scattered first. Takes as many numbers whichever emitter it comes from.
     #[inline(never)]
     fn draw_bounce(&self, sampler: &mut Sampler, counters: &mut Counters) -> Option<Bounce> {

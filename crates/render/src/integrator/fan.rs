@@ -273,6 +273,7 @@ mod tests {
 
     fn tracer(prepared: &PreparedScene, arch: Arch) -> Tracer<'_, NoRecorder> {
         Tracer {
+            light_paths: false,
             world: prepared.world(),
             visibility: prepared.visibility(),
             settings: prepared.scene().integrator,

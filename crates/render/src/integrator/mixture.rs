@@ -44,7 +44,7 @@ impl<R: Recorder> Tracer<'_, R> {
         let (media, lights) = (&self.world.media, &self.world.lights);
         let near_enough = media.least_sigma_t().recip().min(NEAR * self.world.bounds.extent().length());
         let mut path = Path::new(ray);
-        if self.has_light_paths() {
+        if self.light_paths {
             path.light_path = LightPath::NotYet;
         }
         while self.goes_on(&mut path, sampler) {

@@ -37,6 +37,8 @@ pub(crate) struct Tracer<'a, R> {
     pub(crate) transmittance: TransmittanceEstimator,
     pub(crate) roulette: Roulette,
     pub(crate) estimator: Estimator,
+    /// Whether paths are connected to paths of the lights.
+    pub(crate) light_paths: bool,
     /// The instruction set of vectors.
     pub(crate) arch: Arch,
     /// Whom a long path asks whether to stop.

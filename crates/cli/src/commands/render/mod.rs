@@ -15,8 +15,8 @@ use anyhow::{Context as _, anyhow};
 use vdf_image::{StagedFile, check_distinct, shown};
 use vdf_lab::queries::{QueryStream, record_queries};
 use vdf_render::{
-    Estimator, Film, FilmPart, Integrator, NoiseLimit, PrepareOptions, PreparedScene, RenderOptions, Roulette,
-    SamplerKind, SegmentSamples, TransmittanceEstimator, Work, thread_count,
+    Estimator, Film, FilmPart, Integrator, LightPaths, NoiseLimit, PrepareOptions, PreparedScene, RenderOptions,
+    Roulette, SamplerKind, SegmentSamples, TransmittanceEstimator, Work, thread_count,
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
@@ -27,7 +27,7 @@ pub(super) use self::output::{Places, check_places, stage_json, write_json, writ
 use self::passes::{Checkpoint, Plan, Rendered};
 use crate::{
     args::{
-        EstimatorName, MethodChoice, PictureArgs, ProgressName, RenderArgs, RouletteName, SamplerName,
+        EstimatorName, LightPathsName, MethodChoice, PictureArgs, ProgressName, RenderArgs, RouletteName, SamplerName,
         TransmittanceName,
     },
     failure::{Failure, say, speak_json},
@@ -260,6 +260,11 @@ fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
             EstimatorName::Thesis => Estimator::Thesis,
             EstimatorName::Equiangular => Estimator::Equiangular,
             EstimatorName::Lit => Estimator::Lit,
+        },
+        light_paths: match args.light_paths {
+            LightPathsName::Auto => LightPaths::Auto,
+            LightPathsName::Always => LightPaths::Always,
+            LightPathsName::Never => LightPaths::Never,
         },
         sampler: match args.sampler {
             SamplerName::Independent => SamplerKind::Independent,

@@ -92,6 +92,7 @@ fn attributes(film: &Film, reproducible: bool) -> Vec<(&'static str, AttributeVa
         ("vdf.transmittance", o.transmittance.as_str().into()),
         ("vdf.roulette", o.roulette.as_str().into()),
         ("vdf.estimator", o.estimator.as_str().into()),
+        ("vdf.lightPaths", o.light_paths.as_str().into()),
         ("vdf.sampler", o.sampler.as_str().into()),
         ("vdf.samplesPerPixel", (spp as i64).into()),
         ("vdf.seed", o.seed.to_string().into()),
