@@ -30,6 +30,7 @@ use crate::{
 
 /// What a path has of its light path.
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "one for each path, on the stack")]
 pub(super) enum LightPath {
     /// It is to have none.
     Never,
