@@ -38,8 +38,8 @@ const MOST_TEXELS: u32 = 8192;
 pub enum Estimator {
     /// The thesis's own: distances by transmittance alone, emitters seen from wherever that leads (Sec. 2.3 and 2.5 in \[Houska2013\]).
     Thesis,
-    /// Distances are drawn by the angle that they subtend at a light \[Kulla2012\], too, and by `volpath` directions towards point lights: far less
-    /// noise in thin fog and around lights.
+    /// Distances are drawn by the angle that they subtend at a light \[Kulla2012\], too, and events of `volpath` are connected to rays from the lights
+    /// ([`LightPaths`]): far less noise in thin fog and around lights, and where light comes from other surfaces.
     #[default]
     Equiangular,
     /// By `raymarch` light of point emitters is gathered only where a ray is lit ([`vdf_visibility::LitIntervals`]); all else as `equiangular`, for
