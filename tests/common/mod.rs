@@ -27,6 +27,8 @@ pub struct Options {
     pub transmittance: TransmittanceEstimator,
     pub roulette: Roulette,
     pub estimator: Estimator,
+    /// Whether they pay or not, they are to be right.
+    pub light_paths: LightPaths,
     pub sampler: SamplerKind,
     pub spp: Option<u32>,
     pub seed: Option<u64>,
@@ -44,6 +46,7 @@ pub fn options() -> Options {
         transmittance: TransmittanceEstimator::Analytic,
         roulette: Roulette::Standard,
         estimator: Estimator::Thesis,
+        light_paths: LightPaths::Always,
         sampler: SamplerKind::Independent,
         spp: None,
         seed: None,
@@ -61,7 +64,7 @@ pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
         threads: o.threads,
         ..PrepareOptions::with_method(o.method)
     };
-    let Options { integrator, transmittance, roulette, estimator, sampler, .. } = *o;
+    let Options { integrator, transmittance, roulette, estimator, light_paths, sampler, .. } = *o;
     let Options { spp, seed, threads, crop, segment_first, .. } = *o;
     let options = RenderOptions {
         integrator,
@@ -74,8 +77,7 @@ pub fn render(scene: &Scene, o: &Options) -> Result<Rendering, RenderError> {
         threads,
         crop,
         segment_first,
-        // Whether they pay or not, they are to be right.
-        light_paths: LightPaths::Always,
+        light_paths,
         ..RenderOptions::default()
     };
     PreparedScene::new(scene.clone(), &prepare, &Quiet)?.render(&options, &Quiet)
