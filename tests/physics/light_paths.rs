@@ -104,3 +104,29 @@ fn a_light_on_a_wall_sends_nothing() {
         assert!(rendered(&scene, &o).image.pixels.iter().all(|p| *p == Rgb::ZERO), "{estimator:?}");
     }
 }
+
+/// Where a lamp shines at the ceiling light paths pay; where one shines on what is seen they do not; and what is chosen is what could have been asked for.
+#[test]
+fn light_paths_are_taken_where_they_pay() {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    for (file, pay) in [("physics/light_paths.xml", true), ("mitsuba/scenes/disney.xml", false)] {
+        let mut scene = Scene::load(&tests.join(file), &LoadOptions::default()).expect("the scene loads");
+        if pay {
+            scene
+                .emitters
+                .retain(|e| matches!(e, Emitter::Area { surface } if scene.surfaces[*surface].curved.is_none()));
+        }
+        let render = |light_paths, threads| {
+            let (estimator, spp, threads) = (Estimator::Equiangular, Some(2), Some(threads));
+            rendered(&scene, &Options { integrator: VOLPATH, estimator, light_paths, spp, threads, ..options() })
+        };
+        let [never, always] = [LightPaths::Never, LightPaths::Always].map(|way| render(way, 2));
+        assert!(never.statistics.connections == 0 && always.statistics.connections > 0);
+        for threads in [1, 2] {
+            let auto = render(LightPaths::Auto, threads);
+            let chosen = if pay { &always } else { &never };
+            assert_eq!(auto.statistics.connections, chosen.statistics.connections, "{file}");
+            assert!(auto.image.pixels == chosen.image.pixels, "{file}");
+        }
+    }
+}

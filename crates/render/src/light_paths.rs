@@ -5,23 +5,26 @@
 //!
 //! *Definition.* Of [`SIDE`]² pixels, spread evenly over the film, [`SAMPLES`] paths each are followed in both ways. Noise is the variance of a pixel's paths over the square of
 //! the mean of the pixels around, averaged without the pixels where it is largest; cost is counted in rays and queries, by what they take in the profile. The less of the
-//! product is taken.
+//! product is taken. Paths end after [`EVENTS`] events, or in white fog the look would take longer than the render.
 //!
 //! *Guarantee.* A function of the scene alone: no clock is asked, and neither crop, samples, seed, shards, threads nor method matter. Both ways have the same mean.
 //!
 //! *Cost.* 4096 paths, once a scene: some hundredths of a second.
 
 use glam::DVec3;
+use vdf_scene::{IntegratorSettings, Scene};
 use vdf_visibility::{Counters, Provers, Visibility};
 
 use crate::{Camera, Estimator, Quiet, Roulette, Sampler, TransmittanceEstimator, integrator::Tracer, world::World};
-use vdf_scene::Scene;
 
 /// Pixels along each side of the film, if it has so many.
 const SIDE: u32 = 16;
 
 /// Paths for each of them and each way.
 const SAMPLES: u32 = 8;
+
+/// The most events of a path.
+const EVENTS: u32 = 32;
 
 /// The mean is taken over squares of so many of these pixels along each side.
 const AROUND: u32 = 4;
@@ -41,11 +44,13 @@ pub(crate) fn pay(scene: &Scene, world: &World) -> bool {
     let [columns, rows] = [film.width, film.height].map(|size| SIDE.min(size));
     let place = |i: u32, n: u32, size: u32| (f64::from(i) + 0.5) * f64::from(size) / f64::from(n);
     let provers = Provers::none();
+    let max_depth = scene.integrator.max_depth.map_or(EVENTS, |depth| depth.min(EVENTS));
+    let settings = IntegratorSettings { max_depth: Some(max_depth), ..scene.integrator };
     let mut ways = [false, true].map(|light_paths| {
         let tracer = Tracer {
             world,
             visibility: Visibility::new(&world.bvh, &provers),
-            settings: scene.integrator,
+            settings,
             transmittance: TransmittanceEstimator::Analytic,
             roulette: Roulette::default(),
             estimator: Estimator::Equiangular,
