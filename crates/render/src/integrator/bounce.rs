@@ -28,6 +28,9 @@ use crate::{
     world::SurfacePoint,
 };
 
+/// A connection that brings less than this share of the light that the path has gathered is made as seldom as it brings less, and is then worth as much more.
+const LITTLE: f32 = 0.05;
+
 /// What a path has of its light path.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "one for each path, on the stack")]
@@ -155,6 +158,14 @@ impl<R: Recorder> Tracer<'_, R> {
             }
         };
         let segment = Segment::new(from, there);
+        // The weight over d².
+        let share = bounce.density / (pdf * cosine + bounce.density * distance2);
+        let transmittance = self.world.media.transmittance(&segment, regions);
+        let value = value * to_f32(transmittance * share);
+        let worth = (path.throughput * value).max_element();
+        let Some(factor) = by_chance(worth, LITTLE * path.radiance.max_element(), sampler.aside()) else {
+            return Rgb::ZERO;
+        };
         if !self.visibility.connected(&segment, counters) {
             return Rgb::ZERO;
         }
@@ -162,10 +173,7 @@ impl<R: Recorder> Tracer<'_, R> {
             None => Rgb::ONE,
             Some(others) => self.passes(others, &segment, to).map_or(Rgb::ZERO, |(passed, _)| passed),
         };
-        let transmittance = self.world.media.transmittance(&segment, regions);
-        // The weight over d².
-        let share = bounce.density / (pdf * cosine + bounce.density * distance2);
-        value * passed * to_f32(transmittance * share)
+        value * passed * factor
     }
 
     /// What of the light is scattered against `to`, over cos θ', with what it has of cos θ; and cos θ.
@@ -225,4 +233,31 @@ impl<R: Recorder> Tracer<'_, R> {
 pub(super) fn share_beside_bounce(arrival: f64, by_bounce: f64) -> f64 {
     // Where no light path can be, all of it; and where neither has a density nothing was connected.
     if arrival.is_finite() && by_bounce > 0.0 { arrival / (arrival + by_bounce) } else { 1.0 }
+}
+
+/// So many times its worth is what brings less than `little`, if it is taken by a uniform number.
+#[inline]
+fn by_chance(worth: f32, little: f32, u: f64) -> Option<f32> {
+    if worth >= little {
+        return Some(1.0);
+    }
+    (u * f64::from(little) < f64::from(worth)).then(|| little / worth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By evenly spaced numbers, for which the mean is exact but for one of them.
+    #[test]
+    fn what_is_taken_by_chance_has_its_mean() {
+        for (worth, little) in
+            [(0.03_f32, 0.2), (0.2, 0.2), (1.0, 0.2), (1e-3, 0.2), (0.5, 0.0), (0.0, 0.0), (0.0, 0.2)]
+        {
+            let n = 10_000;
+            let taken = (0..n).filter_map(|i| by_chance(worth, little, f64::from(i) / f64::from(n)));
+            let mean = taken.map(|factor| f64::from(factor * worth)).sum::<f64>() / f64::from(n);
+            assert!((mean - f64::from(worth)).abs() <= 1.1e-4 * f64::from(little) + 1e-7, "{worth}, {little}: {mean}");
+        }
+    }
 }
