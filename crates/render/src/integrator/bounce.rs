@@ -206,22 +206,13 @@ impl<R: Recorder> Tracer<'_, R> {
     pub(super) fn density_of_arrival(&self, origin: &Origin, point: DVec3, vertex: &Vertex) -> f64 {
         let &Origin::Scattering { point: before, pdf, connected: true, .. } = origin else { return f64::INFINITY };
         let (back, distance2) = (before - point, before.distance_squared(point));
-        let cosine = match vertex {
-            Vertex::InMedium { .. } => 1.0,
-            Vertex::OnSurface(s) => s.normal.dot(back).max(0.0) / distance2.sqrt(),
-            Vertex::OnMaterial(s, _) => s.normal.dot(back).max(0.0) / distance2.sqrt(),
-        };
-        pdf * cosine / distance2
+        pdf * vertex.cosine_to(back / distance2.sqrt()) / distance2
     }
 
     /// The weight of what an event with this density of arrival gets straight from `light`.
     #[inline]
     pub(super) fn weight_beside_bounce(&self, arrival: f64, point: DVec3, vertex: &Vertex, light: &LightSample) -> f64 {
-        let cosine = match vertex {
-            Vertex::InMedium { .. } => 1.0,
-            Vertex::OnSurface(s) => light.direction.dot(s.normal).max(0.0),
-            Vertex::OnMaterial(s, _) => light.direction.dot(s.normal).max(0.0),
-        };
+        let cosine = vertex.cosine_to(light.direction);
         let distance2 = light.point.distance_squared(point);
         let of_direction = self.world.lights.density_of_beam(light.emitter, distance2, light.pdf);
         share_beside_bounce(arrival, of_direction * cosine / distance2)

@@ -474,6 +474,16 @@ impl<R: Recorder> Tracer<'_, R> {
 }
 
 impl Vertex<'_> {
+    /// The cosine of a unit direction's angle to the normal, at least 0; 1 in a medium, which has none.
+    #[inline]
+    fn cosine_to(&self, direction: DVec3) -> f64 {
+        match self {
+            Self::InMedium { .. } => 1.0,
+            Self::OnSurface(s) => s.normal.dot(direction).max(0.0),
+            Self::OnMaterial(s, _) => s.normal.dot(direction).max(0.0),
+        }
+    }
+
     /// Which ends of a query towards an emitter lie on an occluder.
     #[inline]
     const fn query_kind(&self, light: &LightSample) -> QueryKind {
