@@ -21,19 +21,34 @@ type Keeps = fn(&Scene, &Emitter) -> bool;
 /// each; 5 of their standard errors, with 15 degrees of freedom, are a false alarm of 2·10⁻⁴ each; colours and parts are much the same, so that this is about 0.01 over all, for a
 /// given seed.
 fn light_paths_bring_what_rays_find(spp: u32, enough: f64) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/physics/light_paths.xml");
-    let all = Scene::load(&path, &LoadOptions::default()).expect("the scene loads");
+    let all = load();
     let kinds: [(&str, Keeps); 6] = [
         ("all", |_, _| true),
         ("point", |_, e| matches!(e, Emitter::Point { .. })),
         ("spot", |_, e| matches!(e, Emitter::Spot { .. })),
         ("projector", |_, e| matches!(e, Emitter::Projector { .. })),
-        ("lamp", |scene, e| matches!(e, Emitter::Area { surface } if scene.surfaces[*surface].curved.is_none())),
+        ("lamp", is_flat),
         ("ball", |scene, e| matches!(e, Emitter::Area { surface } if scene.surfaces[*surface].curved.is_some())),
     ];
-    for ((name, keeps), max_depth) in kinds.into_iter().flat_map(|kind| [(kind, 3), (kind, 7)]) {
+    for (name, keeps) in kinds {
+        compare(name, &all, keeps, spp, enough);
+    }
+}
+
+fn is_flat(scene: &Scene, e: &Emitter) -> bool {
+    matches!(e, Emitter::Area { surface } if scene.surfaces[*surface].curved.is_none())
+}
+
+fn load() -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/physics/light_paths.xml");
+    Scene::load(&path, &LoadOptions::default()).expect("the scene loads")
+}
+
+/// By 2 events and by up to 6.
+fn compare(name: &str, all: &Scene, keeps: Keeps, spp: u32, enough: f64) {
+    for max_depth in [3, 7] {
         let mut scene = all.clone();
-        scene.emitters.retain(|e| keeps(&all, e));
+        scene.emitters.retain(|e| keeps(all, e));
         for (i, surface) in scene.surfaces.iter_mut().enumerate() {
             if !scene.emitters.iter().any(|e| matches!(e, Emitter::Area { surface } if *surface == i)) {
                 surface.radiance = None;
@@ -82,6 +97,21 @@ fn light_paths_bring_what_rays_find_in_short() {
 #[ignore = "minutes"]
 fn light_paths_bring_what_rays_find_for_long() {
     light_paths_bring_what_rays_find(2048, 0.008);
+}
+
+/// Half of the lamp in dense fog: a ray of it starts in the medium of its own place.
+#[test]
+fn a_lamp_on_the_border_of_fog_shines_on_both_sides() {
+    let mut scene = load();
+    scene.media.iter_mut().for_each(|m| m.sigma_t = vdf::scene::Extinction::Constant(DVec3::splat(4.0)));
+    for surface in &mut scene.surfaces {
+        if surface.radiance.is_some() && surface.curved.is_none() {
+            for triangle in &mut surface.triangles {
+                triangle.vertices.iter_mut().for_each(|v| *v += Vec3::new(-0.3, -0.6, -1.1));
+            }
+        }
+    }
+    compare("on the border", &scene, is_flat, 64, 0.1);
 }
 
 /// A light that lies on a wall is hidden by it from everywhere: no ray of it brings what no query lets through.
