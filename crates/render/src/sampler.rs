@@ -116,6 +116,12 @@ impl Sampler {
         }
     }
 
+    /// Whether the next number is one of those that are even together.
+    #[inline]
+    pub(crate) fn is_even(&self) -> bool {
+        self.sobol.as_ref().is_some_and(|sobol| sobol.dimension != sobol.even)
+    }
+
     /// A uniform number beside the others: it takes none of them, and is the same until one is taken.
     #[inline]
     pub(crate) fn aside(&self) -> f64 {
@@ -262,6 +268,12 @@ mod tests {
         assert_eq!(few[..12], all[..12]);
         assert_eq!(few[12..], none[12..]);
         assert!((0..12).all(|i| all[i] != none[i]));
+        let mut sampler = Sampler::of_kind(SamplerKind::Sobol, 3, 1, 2, 9).even_up_to(12);
+        for i in 0..20 {
+            assert_eq!(sampler.is_even(), i < 12);
+            sampler.next_1d();
+        }
+        assert!(!Sampler::new(3, 1, 2, 9).is_even());
     }
 
     #[test]

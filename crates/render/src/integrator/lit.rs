@@ -23,7 +23,7 @@ use vdf_visibility::{Answer, Counters, LitIntervals, QueryKind, Recorder, Shadow
 use super::{
     Tracer, Vertex,
     equiangular::{Equiangular, LightPlace},
-    raymarch::Fog,
+    raymarch::{Fog, Strata},
     stretch::Stretch,
     to_f32,
 };
@@ -84,13 +84,14 @@ impl<R: Recorder> Tracer<'_, R> {
         counters: &mut Counters,
     ) -> Rgb {
         let choices = self.likely_points(fog, stretches);
+        let strata = Strata::new(fog.samples, sampler);
         let mut sum = Rgb::ZERO;
         let mut known: Option<(usize, Lit)> = None;
         for k in 0..fog.samples {
             if self.stops_at(k) {
                 break;
             }
-            let u = (f64::from(k) + sampler.next_1d()) / f64::from(fog.samples);
+            let u = strata.number(k, sampler);
             let flight = self.flight_to_emitter(sampler);
             let Some((choice, u)) = self.draw_point(&choices, u) else { break };
             if known.as_ref().is_none_or(|(of, _)| *of != choice.emitter) {
