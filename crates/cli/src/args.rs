@@ -234,6 +234,9 @@ pub(crate) enum SceneCommand {
         /// Folder to write to; made if it does not exist
         #[arg(default_value = ".")]
         folder: PathBuf,
+        /// Replace files that are there and differ
+        #[arg(long)]
+        force: bool,
         /// About how many triangles a generated scene gets, from 100000 to 10000000
         #[arg(long, value_name = "N", value_parser = parse_size)]
         triangles: Option<u32>,
@@ -364,8 +367,8 @@ Perceived differences, mean over the pixels, 0 is equal, 1 is the worst:
   flip-hdr  FLIP over all exposures that suit B; for EXR only
 And whether all pixels are the same, bit for bit.
 
-Exit codes: 0 compared, 1 relmse is more than --max-relmse or a file cannot be read or written,
-2 images that cannot be compared.")]
+Exit codes: 0 compared, 1 relmse is more than --max-relmse or the map cannot be written, 2 images that cannot be
+read or compared.")]
 pub(crate) struct CompareArgs {
     /// The image
     pub(crate) a: PathBuf,

@@ -4,7 +4,10 @@ use std::{
     fmt,
     io::{self, Write as _},
     process::ExitCode,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use anyhow::anyhow;
@@ -51,6 +54,15 @@ impl Failure {
         ExitCode::from(self.code())
     }
 
+    /// The same failure, told of this part of the work.
+    pub(crate) fn of(self, part: &str) -> Self {
+        match self {
+            Self::Usage(e) => Self::Usage(e.context(part.to_owned())),
+            Self::Work(e) => Self::Work(e.context(part.to_owned())),
+            other => other,
+        }
+    }
+
     const fn code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
@@ -86,6 +98,24 @@ pub(crate) fn say_end(code: u8) {
     if JSON.load(Ordering::Relaxed) {
         say_object(&serde_json::json!({ "event": "end", "code": code }));
     }
+}
+
+/// Why stdout could not take all that was told.
+static UNTOLD: Mutex<Option<io::Error>> = Mutex::new(None);
+
+/// A line of results on stdout. Whoever reads it may be gone: files are still to be written, so the program goes on and fails in the end ([`said`]).
+pub(crate) fn tell(line: fmt::Arguments<'_>) {
+    let mut untold = UNTOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    if untold.is_none()
+        && let Err(error) = writeln!(io::stdout(), "{line}")
+    {
+        *untold = Some(error);
+    }
+}
+
+/// Fails if some of what was told could not be written.
+pub(crate) fn said() -> Result<(), Failure> {
+    UNTOLD.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), |error| Err(error.into()))
 }
 
 /// A line on stderr. Unlike `eprintln!` it does not panic if nobody can read it.

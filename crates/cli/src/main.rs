@@ -7,27 +7,36 @@ mod args;
 mod commands;
 mod failure;
 mod progress;
+mod signals;
 
 use std::process::ExitCode;
 
+use anyhow::anyhow;
 use clap::Parser as _;
 
 use crate::{
     args::{Arguments, Command},
-    failure::{Failure, say_end},
+    failure::{Failure, said, say_end, speak_json},
 };
 
 fn main() -> ExitCode {
     survive_limits();
+    if asks_for_json() {
+        speak_json();
+    }
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         // Help and version go to stdout, usage errors to stderr; clap knows which, but not whether they arrived.
         Err(message) => {
             let code = u8::try_from(message.exit_code()).unwrap_or(2);
+            if asks_for_json() && message.use_stderr() {
+                let message = message.to_string();
+                return Failure::Usage(anyhow!("{}", message.trim_start_matches("error: ").trim_end())).report();
+            }
             return if message.print().is_ok() { code.into() } else { ExitCode::FAILURE };
         }
     };
-    match run(&arguments) {
+    match run(&arguments).and_then(|()| said()) {
         Ok(()) => {
             say_end(0);
             ExitCode::SUCCESS
@@ -44,6 +53,13 @@ fn survive_limits() {
         // If that cannot be had, the program still works, and ends as it did.
         drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default()));
     }
+}
+
+/// Whether a program reads stderr: known before the arguments are understood, for it shall understand that they were not.
+fn asks_for_json() -> bool {
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    arguments.iter().any(|a| a == "--progress=json")
+        || arguments.windows(2).any(|pair| pair[0] == "--progress" && pair[1] == "json")
 }
 
 fn run(arguments: &Arguments) -> Result<(), Failure> {

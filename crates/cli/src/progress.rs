@@ -11,7 +11,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 use vdf_image::remove_temporaries;
 use vdf_render::Progress;
@@ -20,6 +19,7 @@ use self::json::Json;
 use crate::{
     args::ProgressName,
     failure::{Failure, say},
+    signals::on_end,
 };
 
 /// Progress on stderr: a bar on a terminal, else a line now and then, or JSON, or nothing.
@@ -62,7 +62,7 @@ impl Reporter {
     pub(crate) fn of_kind(quiet: bool, progress: ProgressName) -> Result<Self, Failure> {
         let (interrupted, writes) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         let (flag, busy) = (Arc::clone(&interrupted), Arc::clone(&writes));
-        ctrlc::set_handler(move || {
+        on_end(move || {
             let again = flag.swap(true, Ordering::Relaxed);
             if again || !busy.load(Ordering::Relaxed) {
                 remove_temporaries();
@@ -71,9 +71,7 @@ impl Reporter {
                 }
                 std::process::exit(130);
             }
-        })
-        .context("cannot listen for Ctrl-C")
-        .map_err(Failure::Work)?;
+        })?;
         let voice = match progress {
             ProgressName::Json => Voice::Json(Mutex::new(Json::new())),
             ProgressName::Auto if quiet => Voice::Nobody,

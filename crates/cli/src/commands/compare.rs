@@ -56,12 +56,17 @@ fn check_map(map: &Path, args: &CompareArgs) -> Result<(), Failure> {
     {
         return Err(Failure::Usage(anyhow!("--map {}: that is one of the images; give another name", shown(map))));
     }
+    if map.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+        return Err(Failure::Usage(anyhow!("--map {}: the map is a PNG; give a name that ends in .png", shown(map))));
+    }
     check_writable(map).with_context(|| format!("cannot write {}", shown(map))).map_err(Failure::Work)
 }
 
 fn read(args: &CompareArgs) -> Result<(Image, Image, DynamicRange), Failure> {
-    let (a, a_format) = read_image(&args.a)?;
-    let (b, b_format) = read_image(&args.b)?;
+    // Not the failure of a comparison: 1 means that the images differ too much.
+    let image = |path: &Path| read_image(path).map_err(|e| Failure::Usage(e.into()));
+    let (a, a_format) = image(&args.a)?;
+    let (b, b_format) = image(&args.b)?;
     let range = match (a_format, b_format) {
         (ImageFormat::Exr, ImageFormat::Exr) => DynamicRange::High,
         (ImageFormat::Png, ImageFormat::Png) => DynamicRange::Low,

@@ -1,7 +1,8 @@
 //! `vdf scene`.
 
 use std::{
-    io::{self, Write},
+    fs::File,
+    io::{self, BufRead as _, BufReader, Write},
     path::Path,
 };
 
@@ -10,16 +11,20 @@ use vdf_image::{shown, write_atomically};
 use vdf_scene::EmbeddedFile;
 use vdf_scenes::{GeneratedFile, Size, builtin, builtin_names, generated};
 
-use crate::{args::SceneCommand, failure::Failure, progress::Reporter};
+use crate::{
+    args::SceneCommand,
+    failure::{Failure, tell},
+    progress::Reporter,
+};
 
 pub(crate) fn run(command: &SceneCommand) -> Result<(), Failure> {
     match command {
         SceneCommand::List => list(),
-        SceneCommand::Write { name, folder, triangles, voxels } => match generated(name) {
+        SceneCommand::Write { name, folder, force, triangles, voxels } => match generated(name) {
             Some(scene) => {
                 let scene = triangles.map_or(Ok(scene), |n| scene.with_triangles(n))?;
                 let scene = voxels.map_or(Ok(scene), |n| scene.with_voxels(n))?;
-                write(scene.files().map(SceneFile::Generated), folder)
+                write(&scene.files().map(SceneFile::Generated).collect::<Vec<_>>(), folder, *force)
             }
             None => {
                 let names = builtin_names().join(", ");
@@ -31,7 +36,7 @@ pub(crate) fn run(command: &SceneCommand) -> Result<(), Failure> {
                     let message = anyhow!("--{option} is for generated scenes; {name} always has the same {option}");
                     return Err(Failure::Usage(message));
                 }
-                write(source.files().iter().map(SceneFile::Embedded), folder)
+                write(&source.files().iter().map(SceneFile::Embedded).collect::<Vec<_>>(), folder, *force)
             }
         },
     }
@@ -76,11 +81,20 @@ impl SceneFile<'_> {
     }
 }
 
-fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Result<(), Failure> {
+fn write(files: &[SceneFile<'_>], folder: &Path, force: bool) -> Result<(), Failure> {
     // It only listens for Ctrl-C: large files take a while, and an unfinished one must not stay behind.
     let reporter = Reporter::new(true)?;
     reporter.writes();
-    for (written, file) in files.enumerate() {
+    for file in files.iter().filter(|_| !force) {
+        let path = folder.join(file.path());
+        if path.exists() && !is_in(file, &path) {
+            return Err(Failure::Usage(anyhow!(
+                "{} is there and differs: name another folder, or replace it with --force",
+                shown(&path)
+            )));
+        }
+    }
+    for (written, file) in files.iter().enumerate() {
         let path = folder.join(file.path());
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent)
@@ -91,9 +105,40 @@ fn write<'a>(files: impl Iterator<Item = SceneFile<'a>>, folder: &Path) -> Resul
             return Err(Failure::InterruptedAfter { written });
         }
         result.with_context(|| format!("cannot write {}", shown(&path))).map_err(Failure::Work)?;
-        writeln!(io::stdout(), "{}", path.display())?;
+        tell(format_args!("{}", path.display()));
     }
     Ok(())
+}
+
+/// Whether the file at `path` has just these bytes.
+fn is_in(file: &SceneFile<'_>, path: &Path) -> bool {
+    let same = || -> io::Result<bool> {
+        let mut expected = Expected { found: BufReader::new(File::open(path)?) };
+        file.write(&mut expected)?;
+        Ok(expected.found.fill_buf()?.is_empty())
+    };
+    same().unwrap_or(false)
+}
+
+/// A writer that fails at the first byte that is not the one that is found.
+struct Expected {
+    found: BufReader<File>,
+}
+
+impl Write for Expected {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let found = self.found.fill_buf()?;
+        let n = bytes.len().min(found.len());
+        if bytes[..n] != found[..n] || (n == 0 && !bytes.is_empty()) {
+            return Err(io::Error::other("another file"));
+        }
+        self.found.consume(n);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// A writer that fails once Ctrl-C was pressed.

@@ -42,6 +42,21 @@ fn broken_xml() {
     scene_fails("\u{0}\u{1}\u{2}", &["bad.xml:"]);
 }
 
+/// An option that would do nothing is a mistake.
+#[test]
+fn options_without_effect() {
+    for how in [&["--integrator", "raymarch"][..], &["--estimator", "thesis"]] {
+        render_fails(&[&["--light-paths", "always"], how].concat(), 2, &["--light-paths always goes with"]);
+    }
+    for how in [&["--integrator", "raymarch"][..], &["--method", "none"]] {
+        render_fails(&[&["--segment-first"], how].concat(), 2, &["--segment-first goes with"]);
+    }
+    render_fails(&["--light-buffer", "8", "--method", "amr"], 2, &["--light-buffer goes with --method lb or auto"]);
+    let sequence = ["--sequence", "max_depth=2..3", "-D", "max_depth=4", "-o", "a#.exr"];
+    render_fails(&sequence, 2, &["--sequence max_depth=2..3: -D max_depth is given as well"]);
+    render_fails(&["--sequence", "rr_depth=-1..3", "-o", "a#.exr"], 2, &["frame 1: "]);
+}
+
 #[test]
 fn voxel_size() {
     for size in ["0", "-1", "nan", "inf", "-inf", "-0"] {

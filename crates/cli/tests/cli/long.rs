@@ -133,6 +133,34 @@ fn shards_are_merged_as_they_arrive() {
     let outcome = sandbox.run(&[&into[..], &["-o", "merged.exr", "--quiet", "2.film", "0.film"]].concat());
     outcome.succeeded();
     same(&sandbox, "merged");
+    // As `*.film` names all of them from now on.
+    let all = ["--quiet", "-o", "again.exr", "0.film", "1.film", "2.film", "./all.film"];
+    sandbox.run(&[&into[..], &all].concat()).succeeded();
+    same(&sandbox, "again");
+    sandbox.fails(&["merge", "0.film", "--into", "all.exr"], 2, &["--into all.exr: a film"]);
+}
+
+/// What has no end of its own has no shards; the message says so.
+#[test]
+fn a_checkpoint_among_shards_is_recognized() {
+    let sandbox = Sandbox::new();
+    sandbox.run(&args("0.film", &["--shard", "0/2"])).succeeded();
+    let kept = ["--time-limit", "50ms", "--checkpoint", "kept.film", "-o", "a.exr", "--reproducible"];
+    sandbox.run(&[&["render", "-D", "width=40", "-D", "height=24"][..], &kept].concat()).succeeded();
+    let parts = ["kept.film", "one of them is a checkpoint of a render with --time-limit, not a shard"];
+    sandbox.fails(&["merge", "0.film", "kept.film", "-o", "b.exr"], 2, &parts);
+}
+
+#[test]
+fn what_is_there_only_in_part_is_rendered_again() {
+    let sandbox = with_whole();
+    let skip = ["--skip-existing", "--stats", "a.json"];
+    let skipped = || sandbox.run(&args("whole.exr", &skip)).stderr.contains("is not rendered again");
+    assert!(!skipped());
+    assert!(skipped());
+    fs::remove_file(sandbox.path().join("whole.png")).unwrap();
+    assert!(!skipped());
+    assert!(skipped());
 }
 
 #[test]
@@ -156,7 +184,7 @@ fn strangers_are_not_merged() {
     fs::write(sandbox.path().join("1.film"), "junk").unwrap();
     sandbox.fails(&["merge", "0.film", "1.film", "-o", "a.exr"], 1, &["1.film: it is no film of vdf"]);
     sandbox.fails(&["merge", "0.film", "-o", "0.film"], 2, &["must end in .exr"]);
-    sandbox.fails(&["merge", "0.film", "--into", "0.film"], 2, &["would overwrite the input"]);
+    sandbox.fails(&["merge", "0.film", "-o", "b.exr", "--stats", "0.film"], 2, &["would overwrite the input"]);
     sandbox.fails(&args("a.exr", &["--shard", "0/2"]), 2, &["a.exr: the output of a shard must end in .film"]);
     sandbox.fails(&args("a.film", &["--shard", "2/2"]), 2, &["the shards of 2 are 0/2 to 1/2"]);
 }
@@ -190,6 +218,12 @@ fn progress_is_one_object_a_line() {
     let lines = self::lines(&outcome);
     assert_eq!((lines.len(), &lines[0]["event"], &lines[1]["code"]), (2, &"error".into(), &2.into()));
     assert!(lines[0]["message"].as_str().unwrap().starts_with("no.xml: no such file"));
+
+    // What the arguments themselves are wrong in is told in the same way.
+    for wrong in [&["--spp", "x", "--progress", "json"][..], &["--progress=json", "--nosuch"]] {
+        let lines = self::lines(&sandbox.run(&[&["render"], wrong].concat()));
+        assert_eq!((lines.len(), &lines[0]["event"], &lines[1]["code"]), (2, &"error".into(), &2.into()));
+    }
 }
 
 /// Whatever the time lets be done is a whole render of so many samples.
@@ -300,7 +334,7 @@ fn noise_ends_tiles_one_by_one() {
     let (tiles, quiet) = (json["noise"]["tiles"].as_u64().unwrap(), json["noise"]["quiet_tiles"].as_u64().unwrap());
     let mean = json["noise"]["mean_spp"].as_f64().unwrap();
     assert!(tiles == 6 && quiet > 0 && (16.0..64.0).contains(&mean), "{json}");
-    assert_eq!(json["paths"].as_f64().unwrap(), mean * 40.0 * 24.0);
+    assert_eq!(json["paths"].as_f64().unwrap(), (mean * 40.0 * 24.0).round());
     run("other.exr", "64", &["--method", "none", "-j", "1"]).succeeded();
     same(&sandbox, "other");
     // Gone on with from fewer samples, and from a limit that was higher.

@@ -31,6 +31,23 @@ fn written_scene_renders_the_same() {
     assert!(compared.contains("identical: yes\n"), "{compared}");
 }
 
+#[test]
+fn a_scene_that_was_edited_is_not_replaced() {
+    let sandbox = Sandbox::new();
+    let write = ["scene", "write", "cbox_vol2", "s"];
+    sandbox.run(&write).succeeded();
+    // The same bytes once more are no loss.
+    sandbox.run(&write).succeeded();
+    let original = sandbox.read("s/cbox_vol2.xml");
+    for edited in [&original[..original.len() - 1], &[&original[..], b"\n"].concat(), b""] {
+        fs::write(sandbox.path().join("s/cbox_vol2.xml"), edited).unwrap();
+        sandbox.fails(&write, 2, &["s/cbox_vol2.xml is there and differs", "--force"]);
+        assert_eq!(sandbox.read("s/cbox_vol2.xml"), edited);
+    }
+    sandbox.run(&[&write[..], &["--force"]].concat()).succeeded();
+    assert_eq!(sandbox.read("s/cbox_vol2.xml"), original);
+}
+
 /// Lines of all files of a folder that start with `f `.
 fn faces(folder: &Path) -> usize {
     let text = |entry: std::io::Result<fs::DirEntry>| fs::read_to_string(entry.unwrap().path()).unwrap();

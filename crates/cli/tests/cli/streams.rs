@@ -131,6 +131,27 @@ fn stdout_is_a_closed_pipe() {
     }
 }
 
+/// Nobody reads the names of the files; all of them are written.
+#[test]
+fn files_are_written_though_stdout_is_closed() {
+    for (args, files) in [
+        (vec!["scene", "write", "cbox_vol6"], &["cbox_vol6.xml", "meshes"][..]),
+        (
+            [&["render", "--sequence", "max_depth=2..3", "-o", "a#.exr", "--record-queries", "a#.vdfq"], &TINY[..]]
+                .concat(),
+            &["a2.exr", "a2.png", "a2.vdfq", "a3.exr", "a3.png", "a3.vdfq"],
+        ),
+    ] {
+        let sandbox = Sandbox::new();
+        let output = sandbox.command(&args).stdout(full()).output().unwrap();
+        Outcome::new(&args, &output).failed(1, &["cannot write to standard output: No space left on device"]);
+        assert_eq!(sandbox.files(), files);
+        if files.contains(&"meshes") {
+            assert_eq!(fs::read_dir(sandbox.path().join("meshes")).unwrap().count(), 3);
+        }
+    }
+}
+
 #[test]
 fn stderr_is_a_full_device() {
     let sandbox = Sandbox::new();
@@ -239,6 +260,50 @@ fn an_interrupt_writes_a_last_checkpoint() {
         assert!(outcome.stderr.contains("samples are kept in a.film; go on with --resume"), "{}", outcome.stderr);
         assert_eq!(sandbox.files(), ["a.film"]);
     }
+}
+
+/// As under `nohup`: what is ignored from the start stays so.
+#[test]
+fn a_signal_that_is_ignored_stays_ignored() {
+    let sandbox = Sandbox::new();
+    let size = "-D width=48 -D height=32 --spp 100000000 -q -o a.exr";
+    let script = format!("trap '' HUP TERM; exec '{}' render {size}", env!("CARGO_BIN_EXE_vdf"));
+    let mut shell = Command::new("sh");
+    shell.args(["-c", &script]).current_dir(sandbox.path()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = shell.spawn().unwrap();
+    wait_for(|| ticks(&child) > 20);
+    for name in ["-HUP", "-TERM"] {
+        signal(&child, name);
+    }
+    let before = ticks(&child);
+    wait_for(|| ticks(&child) > before + 20);
+    assert!(child.try_wait().unwrap().is_none());
+    signal(&child, "-INT");
+    let outcome = Outcome::new(&["sh", "-c", &script], &child.wait_with_output().unwrap());
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(130), "interrupted; nothing was written\n"));
+}
+
+/// Two renders that were given the same name: the first to write has it.
+#[test]
+fn a_checkpoint_of_another_program_is_not_replaced() {
+    let sandbox = Sandbox::new();
+    let kept = ["--spp", "100000000", "--checkpoint", "a.film", "--every", "1h", "-o", "a.exr"];
+    let kept = [&LONG[..], &kept].concat();
+    let child = spawn(&sandbox, &kept);
+    wait_for(|| ticks(&child) > 20);
+    sandbox.write("a.film", "of another");
+    signal(&child, "-INT");
+    let outcome = Outcome::new(&kept, &child.wait_with_output().unwrap());
+    outcome.failed(1, &["--checkpoint a.film: another program has written such a file"]);
+    assert_eq!(sandbox.read("a.film"), b"of another");
+}
+
+/// Nobody writes to it, and nobody waits.
+#[test]
+fn a_pipe_is_no_film() {
+    let sandbox = Sandbox::new();
+    assert!(Command::new("mkfifo").arg(sandbox.path().join("a.film")).status().unwrap().success());
+    sandbox.fails(&["merge", "a.film", "-o", "a.exr"], 1, &["a.film", "it is not a plain file"]);
 }
 
 #[test]

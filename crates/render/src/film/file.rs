@@ -154,6 +154,10 @@ impl Film {
     /// [`FilmFileError`], if the file cannot be read or is not such a film, whole and unchanged.
     pub fn read(path: &Path) -> Result<Self, FilmFileError> {
         let failed = |source| FilmFileError::Read { path: path.to_owned(), source };
+        // A pipe would wait for whoever writes to it.
+        if !path.metadata().map_err(failed)?.is_file() {
+            return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "it is not a plain file")));
+        }
         let file = File::open(path).map_err(failed)?;
         let length = file.metadata().map_err(failed)?.len();
         Self::decode(path, BufReader::new(file), length)

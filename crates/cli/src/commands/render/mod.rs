@@ -6,7 +6,6 @@ mod passes;
 mod sequence;
 
 use std::{
-    io::Write as _,
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
 };
@@ -20,31 +19,33 @@ use vdf_render::{
 };
 use vdf_scene::{LoadOptions, Scene, SceneSource};
 use vdf_scenes::{DEFAULT_SCENE, builtin, builtin_names};
-use vdf_visibility::Method;
+use vdf_visibility::{Method, PointProver};
 
 use self::display::Display;
 pub(super) use self::output::{Places, check_places, stage_json, write_json, write_picture};
 use self::passes::{Checkpoint, Plan, Rendered};
 use crate::{
     args::{
-        EstimatorName, LightPathsName, MethodChoice, PictureArgs, ProgressName, RenderArgs, RouletteName, SamplerName,
+        EstimatorName, LightPathsName, MethodChoice, PictureArgs, RenderArgs, RouletteName, SamplerName,
         TransmittanceName,
     },
-    failure::{Failure, say, speak_json},
+    failure::{Failure, say, tell},
     progress::Reporter,
 };
 
 /// So many samples per pixel are more than a limit of time lets anyone take.
-const MOST_SAMPLES: u32 = 1 << 30;
+pub(super) const MOST_SAMPLES: u32 = 1 << 30;
 
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
-    if args.long.progress == ProgressName::Json {
-        speak_json();
-    }
     let renders = sequence::renders(args)?;
     let asked = picture_signal();
     let reporter = Reporter::of_kind(args.quiet, args.long.progress)?;
-    renders.iter().try_for_each(|args| render(args, &reporter, &asked))
+    renders.iter().try_for_each(|(frame, args)| {
+        render(args, &reporter, &asked).map_err(|failure| match frame {
+            Some(frame) => failure.of(&format!("frame {frame}")),
+            None => failure,
+        })
+    })
 }
 
 /// One picture, or one shard of it.
@@ -78,7 +79,7 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     let named = load(args.scene.as_deref(), &args.defines, args.sensor)?;
     options.validate(&named.scene)?;
     let output = output(args, &named)?;
-    if args.long.skip_existing && output.exists() {
+    if args.long.skip_existing && output.exists(args) {
         say(format_args!("note: {} is there and is not rendered again", shown(output.path())));
         return Ok(());
     }
@@ -95,7 +96,11 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     }
     prepared.notes().iter().for_each(|note| say(format_args!("note: {note}")));
     let checkpoint = args.long.checkpoint.as_ref();
-    let checkpoint = checkpoint.map(|path| Checkpoint { path: path.clone(), every: args.long.every });
+    let checkpoint = checkpoint.map(|path| Checkpoint {
+        path: path.clone(),
+        every: args.long.every,
+        ours: AtomicBool::new(args.long.resume && path.exists()),
+    });
     let kept = checkpoint.as_ref().map(|c| (c.path.as_path(), args.long.resume));
     let film = passes::begin(prepared.film(&options, &name)?, kept)?;
     if checkpoint.is_some() {
@@ -126,12 +131,12 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
         return Err(Failure::Interrupted);
     }
     finish(args, &plan, &rendered, &output)?;
-    // Last, so that queries do not stay without their picture.
+    // After the picture, so that queries do not stay without it.
     if let (Some(path), Some(stream)) = (&args.record_queries, &stream) {
         write_stream(path, stream)?;
         if !args.quiet {
             let (n, paths) = (stream.queries.len(), stream.origin.paths_recorded);
-            writeln!(std::io::stdout(), "recorded       {n} queries of {paths} paths in {}", shown(path))?;
+            tell(format_args!("recorded       {n} queries of {paths} paths in {}", shown(path)));
         }
     }
     Ok(())
@@ -151,11 +156,10 @@ fn finish(args: &RenderArgs, plan: &Plan<'_>, rendered: &Rendered, output: &Outp
     let Rendered { film, end } = rendered;
     let spp = end - plan.part.samples.start;
     let statistics = plan.prepared.statistics(plan.options, film, spp)?;
-    if args.quiet && statistics.refused > 0 {
+    if statistics.refused > 0 {
         say(format_args!("warning: {} samples were not finite or negative and were left out", statistics.refused));
     }
     let stats = args.stats.as_ref().map(|path| stage_json(path, &statistics)).transpose()?;
-    let stdout = &mut std::io::stdout();
     let wrote = match output {
         Output::Film(path) => {
             let film = film.stage(path).map_err(|e| Failure::Work(e.into()))?;
@@ -172,8 +176,7 @@ fn finish(args: &RenderArgs, plan: &Plan<'_>, rendered: &Rendered, output: &Outp
         }
     };
     if !args.quiet {
-        writeln!(stdout, "{statistics}")?;
-        writeln!(stdout, "wrote          {wrote}")?;
+        tell(format_args!("{statistics}\nwrote          {wrote}"));
     }
     Ok(())
 }
@@ -212,8 +215,14 @@ impl Output {
         }
     }
 
-    fn exists(&self) -> bool {
-        self.path().exists()
+    /// Whether all that the render would write is there.
+    fn exists(&self, args: &RenderArgs) -> bool {
+        let beside = match self {
+            Self::Picture(places) => Some(&places.png),
+            Self::Film(_) => None,
+        };
+        let others = [beside, args.stats.as_ref(), args.record_queries.as_ref()];
+        self.path().exists() && others.into_iter().flatten().all(|path| path.exists())
     }
 
     fn write_so_far(&self, film: &Film, how: &PictureArgs) -> Result<(), Failure> {
@@ -245,6 +254,22 @@ pub(super) fn integrator(
 fn options(args: &RenderArgs) -> Result<RenderOptions, Failure> {
     if args.max_queries == 0 {
         return Err(Failure::Usage(anyhow!("--max-queries must be at least 1")));
+    }
+    let traced = args.integrator == Integrator::Volpath;
+    if args.light_paths == LightPathsName::Always && !(traced && args.estimator != EstimatorName::Thesis) {
+        return Err(Failure::Usage(anyhow!(
+            "--light-paths always goes with --integrator volpath and an estimator other than thesis"
+        )));
+    }
+    if args.segment_first && !(traced && args.method != Some(MethodChoice::One(Method::NONE))) {
+        return Err(Failure::Usage(anyhow!(
+            "--segment-first goes with --integrator volpath and a method other than none"
+        )));
+    }
+    if args.light_buffer.is_some()
+        && matches!(args.method, Some(MethodChoice::One(method)) if method.point_prover() != PointProver::Buffer)
+    {
+        return Err(Failure::Usage(anyhow!("--light-buffer goes with --method lb or auto")));
     }
     Ok(RenderOptions {
         integrator: integrator(args.integrator, args.samples_per_segment)?,
@@ -314,9 +339,10 @@ pub(super) fn load(
             let name = shown(path).to_string();
             return Ok(Named { name, scene: Scene::from_source(&source, &options)?, inputs: vec![] });
         }
-        let what = if path.is_dir() { "a folder; name the scene file in it" } else { "no such file" };
-        let (path, names) = (shown(path), builtin_names().join(", "));
-        return Err(Failure::Usage(anyhow!("{path}: {what}, nor a built-in scene; the built-in scenes are {names}")));
+        let names = builtin_names().join(", ");
+        let what =
+            if path.is_dir() { "a folder; name the scene file in it" } else { "no such file, nor a built-in scene" };
+        return Err(Failure::Usage(anyhow!("{}: {what}; the built-in scenes are {names}", shown(path))));
     }
     let name = path.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
     let source = SceneSource::disk(path);

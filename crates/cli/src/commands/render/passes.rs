@@ -39,6 +39,24 @@ pub(super) struct Plan<'a> {
 pub(super) struct Checkpoint {
     pub(super) path: PathBuf,
     pub(super) every: Duration,
+    /// Whether the file there is this render's: the one that it goes on from, or one that it has written.
+    pub(super) ours: AtomicBool,
+}
+
+impl Checkpoint {
+    /// Writes it; another file that has appeared there since is not replaced.
+    fn write(&self, film: &Film) -> Result<(), Failure> {
+        let path = &self.path;
+        if !self.ours.load(Ordering::Relaxed) && path.exists() {
+            return Err(Failure::Work(anyhow!(
+                "--checkpoint {}: another program has written such a file by now; it is left as it is",
+                shown(path)
+            )));
+        }
+        film.write(path).map_err(|e| Failure::Work(e.into()))?;
+        self.ours.store(true, Ordering::Relaxed);
+        Ok(())
+    }
 }
 
 /// What has been rendered: a film whose tiles all have the samples of the part up to `end`, but for those that are quiet.
@@ -123,7 +141,7 @@ pub(super) fn render(
     match (outcome, checkpoint) {
         (Ok(mut rendered), checkpoint) => {
             if let Some(checkpoint) = checkpoint
-                && let Err(failure) = write(&film.snapshot(), &checkpoint.path)
+                && let Err(failure) = checkpoint.write(&film.snapshot())
             {
                 // The result is worth more than what it was made of.
                 say(format_args!("warning: the last checkpoint: {}", failure.message()));
@@ -134,16 +152,12 @@ pub(super) fn render(
         }
         (Err(Failure::Interrupted), Some(checkpoint)) => {
             let film = film.snapshot();
-            write(&film, &checkpoint.path)?;
+            checkpoint.write(&film)?;
             let (done, path) = (film.total_samples(), shown(&checkpoint.path));
             Err(Failure::Stopped(format!("interrupted; {done} samples are kept in {path}; go on with --resume")))
         }
         (Err(failure), _) => Err(failure),
     }
-}
-
-fn write(film: &Film, path: &Path) -> Result<(), Failure> {
-    film.write(path).map_err(|e| Failure::Work(e.into()))
 }
 
 /// How much there is to do as far as that is known, and how much is done.
@@ -273,7 +287,7 @@ fn keep(
             && written.elapsed() >= checkpoint.every
         {
             clock.note(shared.film, &shared.paths);
-            if let Err(failure) = write(&shared.film.snapshot(), &checkpoint.path) {
+            if let Err(failure) = checkpoint.write(&shared.film.snapshot()) {
                 *shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
                 shared.failed.store(true, Ordering::Relaxed);
                 return;

@@ -21,9 +21,9 @@ struct Frame {
 /// More would be a slip of the pen.
 const MOST_FRAMES: i128 = 1_000_000;
 
-/// The arguments of each render: those given, if there is no sequence.
-pub(super) fn renders(args: &RenderArgs) -> Result<Vec<RenderArgs>, Failure> {
-    let Some(sequence) = &args.long.sequence else { return Ok(vec![args.clone()]) };
+/// The arguments of each render with the number of its frame: those given, if there is no sequence.
+pub(super) fn renders(args: &RenderArgs) -> Result<Vec<(Option<u32>, RenderArgs)>, Failure> {
+    let Some(sequence) = &args.long.sequence else { return Ok(vec![(None, args.clone())]) };
     let of_sequence = |reason: String| Failure::Usage(anyhow!("--sequence {sequence}: {reason}"));
     let frames = match sequence.split_once('=') {
         Some((name, range)) if !Path::new(sequence).exists() => values(name, range).map_err(of_sequence)?,
@@ -36,13 +36,16 @@ pub(super) fn renders(args: &RenderArgs) -> Result<Vec<RenderArgs>, Failure> {
     if chosen.is_empty() {
         return Err(of_sequence("there are no such frames".to_owned()));
     }
-    chosen.into_iter().map(|frame| render(args, frame)).collect()
+    let given = |name: &String| args.defines.iter().any(|(define, _)| define == name);
+    if let Some((name, _)) = chosen[0].defines.iter().find(|(name, _)| given(name)) {
+        return Err(of_sequence(format!("-D {name} is given as well; each frame has a value of its own")));
+    }
+    chosen.into_iter().map(|frame| Ok((Some(frame.number), render(args, frame)?))).collect()
 }
 
 /// The arguments of one frame.
 fn render(args: &RenderArgs, frame: Frame) -> Result<RenderArgs, Failure> {
     let mut args = args.clone();
-    // Those of the command line are first: the same name twice is an error that names it.
     args.defines.extend(frame.defines);
     let scene = args.scene.as_deref().unwrap_or(Path::new(DEFAULT_SCENE));
     let name = scene.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned());
