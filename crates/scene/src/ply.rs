@@ -116,7 +116,10 @@ fn header(lines: &mut Lines<'_>) -> Result<(Format, Vec<ElementKind>), MeshError
     let mut format = None;
     let mut elements: Vec<ElementKind> = Vec::new();
     loop {
-        if !lines.next()? || lines.line > MOST_LINES {
+        if !lines.next()? {
+            return Err(MeshError::of_file("the file ends before the line end_header", ""));
+        }
+        if lines.line > MOST_LINES {
             return Err(lines.error("the header does not end"));
         }
         let text = String::from_utf8_lossy(&lines.text).into_owned();

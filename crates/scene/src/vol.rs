@@ -63,9 +63,15 @@ pub(crate) fn read(input: &mut dyn BufRead, most: u64) -> Result<VoxelGrid, VolE
     let size = [x, y, z].map(u32::try_from);
     let ([Ok(nx), Ok(ny), Ok(nz)], 1 | 3) = (size, channels) else { return Err(unusable("not supported")) };
     let count = [nx, ny, nz].iter().try_fold(channels as u64, |n, &side| n.checked_mul(side.into()));
-    let count = count.filter(|&n| n > 0).ok_or_else(|| unusable("not supported"))?;
+    if count == Some(0) {
+        return Err(unusable("not supported"));
+    }
+    let count = count.unwrap_or(u64::MAX);
     if count > most {
-        return Err(VolError::new(format!("byte 8: {count} numbers; at most {most} are read"), "use a coarser grid"));
+        return Err(VolError::new(
+            format!("byte 8: {x} × {y} × {z} values of {channels} channels; at most {most} numbers are read"),
+            "use a coarser grid",
+        ));
     }
     let mut corners = [0.0_f32; 6];
     for (corner, at) in corners.iter_mut().zip((24_u64..).step_by(4)) {

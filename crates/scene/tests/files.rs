@@ -57,3 +57,38 @@ fn sizes_are_bounded() {
     assert!(message(&mesh).contains("at most 8589934592 are read"), "{}", message(&mesh));
     let _ = std::fs::remove_file(large);
 }
+
+/// A picture may say anything; what is no light is told.
+#[test]
+fn values_of_pictures_that_are_no_light_are_warned_about() {
+    let folder = folder("pictures");
+    let pixels = image::ImageBuffer::from_fn(4, 2, |x, _| {
+        image::Rgb([[0.5, f32::NAN, -1.0, f32::INFINITY][x as usize], 1.0, 1.0])
+    });
+    pixels.save(folder.join("sky.exr")).expect("it can be written");
+    let scene = "<integrator type='volpath'/><sensor type='perspective'/>\
+                 <emitter type='envmap'><string name='filename' value='sky.exr'/></emitter>";
+    let path = naming(&folder, scene);
+    let scene = Scene::load(&path, &LoadOptions::default()).expect("it loads");
+    let told = |part: &str| scene.warnings.iter().any(|w| w.contains(part));
+    assert!(told("scene.xml:1:") && told("6 values of") && told("they are taken as 0"), "{:?}", scene.warnings);
+}
+
+#[test]
+fn what_ends_too_soon_is_told_where() {
+    let folder = folder("ends");
+    let path = folder.join("scene.xml");
+    for text in [
+        "<scene version=\"3.0.0\">\n  <sensor\n",
+        "<scene version=\"3.0.0\">\n  <sensor type='perspective'>\n</sensor>  ",
+    ] {
+        std::fs::write(&path, text).expect("it can be written");
+        let line = text.trim_end().lines().count();
+        assert!(message(&path).contains(&format!("scene.xml:{line}:")), "{}", message(&path));
+    }
+    std::fs::write(folder.join("a.ply"), "ply\nformat ascii 1.0\n").expect("it can be written");
+    let mesh = naming(&folder, "<shape type='ply'><string name='filename' value='a.ply'/></shape>");
+    assert!(message(&mesh).contains("the file ends before the line end_header"), "{}", message(&mesh));
+    let depth = "<sensor type='perspective'/><integrator type='volpath'><integer name='max_depth' value='99999999999999999999'/></integrator>";
+    assert!(message(&naming(&folder, depth)).contains("is too large for an integer"));
+}

@@ -508,9 +508,13 @@ fn spectrum_file(loader: &Loader<'_>, name: &str, element: &Element) -> Result<S
 
 fn parse_integer(element: &Element) -> Result<i64, SceneError> {
     let text = element.require("value")?;
-    text.trim()
-        .parse()
-        .map_err(|_| element.at.error(format!("\"{text}\" is not an integer"), "write digits only, as in 16"))
+    text.trim().parse().map_err(|e: std::num::ParseIntError| {
+        use std::num::IntErrorKind::{NegOverflow, PosOverflow};
+        match e.kind() {
+            PosOverflow | NegOverflow => element.at.error(format!("{text} is too large for an integer"), "of 64 bits"),
+            _ => element.at.error(format!("\"{text}\" is not an integer"), "write digits only, as in 16"),
+        }
+    })
 }
 
 fn rgb(element: &Element) -> Result<DVec3, SceneError> {

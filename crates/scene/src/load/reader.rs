@@ -70,7 +70,13 @@ impl Reader<'_> {
             .map_err(|e| lines.place(e.offset).error(e.message, ""))?;
         let document = roxmltree::Document::parse(&prepared).map_err(|e| {
             let pos = e.pos();
-            let at = Place { file: lines.file.clone(), line: pos.row, column: pos.col };
+            let at = match e {
+                // The parser gives no place to what lacks its end.
+                roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode => {
+                    lines.place(text.trim_end().len())
+                }
+                _ => Place { file: lines.file.clone(), line: pos.row, column: pos.col },
+            };
             at.error(format!("XML: {}", without_position(&e.to_string())), "")
         })?;
         self.open_files.push(path.to_path_buf());

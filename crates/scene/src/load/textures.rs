@@ -139,7 +139,17 @@ pub(super) fn pixels(loader: &Loader<'_>, name: &str, at: &Place, raw: bool) -> 
                 )
             };
             let image = decoded(loader, &path, MAX_PIXELS.saturating_sub(used)).map_err(|e| unreadable(&e))?;
-            Ok(Arc::clone(entry.insert(Arc::new(linear(&image, raw)))))
+            let (pixels, unusable) = linear(&image, raw);
+            if unusable > 0 {
+                loader.warn(
+                    at,
+                    &format!(
+                        "{unusable} values of \"{}\" are negative or not finite: they are taken as 0",
+                        path.display()
+                    ),
+                );
+            }
+            Ok(Arc::clone(entry.insert(Arc::new(pixels))))
         }
     }
 }
@@ -173,15 +183,20 @@ fn decoded(loader: &Loader<'_>, path: &Path, most: u64) -> Result<DynamicImage, 
     Ok(reader.decode()?)
 }
 
-/// Linear RGB in single precision: integers are sRGB, unless raw; what is not finite or negative becomes zero.
-fn linear(image: &DynamicImage, raw: bool) -> Pixels {
+/// Linear RGB in single precision: integers are sRGB, unless raw; what is not finite or negative becomes zero. And how many values are.
+fn linear(image: &DynamicImage, raw: bool) -> (Pixels, usize) {
     let is_float = matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let decode = |v: f32| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    let channel = |v: f32| {
+    let mut unusable = 0;
+    let mut channel = |v: f32| {
         let v = if is_float || raw { v } else { decode(v) };
-        if v.is_finite() { v.max(0.0) } else { 0.0 }
+        if v.is_finite() && v >= 0.0 {
+            return v;
+        }
+        unusable += 1;
+        0.0
     };
     let rgb = image.to_rgb32f();
-    let rgb = rgb.pixels().map(|p| Rgb::from_array(p.0.map(channel))).collect();
-    Pixels { width: image.width(), height: image.height(), rgb }
+    let rgb = rgb.pixels().map(|p| Rgb::from_array(p.0.map(&mut channel))).collect();
+    (Pixels { width: image.width(), height: image.height(), rgb }, unusable)
 }
