@@ -60,16 +60,12 @@ pub(crate) fn sample_cosine_hemisphere(normal: DVec3, [u0, u1]: [f64; 2]) -> (DV
     (direction_about(normal, cos_theta, u0.sqrt(), u1), cos_theta / PI)
 }
 
-/// A uniform direction about `axis`; its density is 1/4π.
-#[inline]
-pub(crate) fn sample_sphere_about(axis: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
-    direction_about(axis, 2.0 * u0 - 1.0, 2.0 * (u0 * (1.0 - u0)).sqrt(), u1)
-}
-
 /// A uniform direction of the sphere; its density is 1/4π.
 #[inline]
-pub(crate) fn sample_uniform_sphere(u: [f64; 2]) -> DVec3 {
-    sample_sphere_about(DVec3::Z, u)
+pub(crate) fn sample_uniform_sphere([u0, u1]: [f64; 2]) -> DVec3 {
+    let sin_theta = 2.0 * (u0 * (1.0 - u0)).sqrt();
+    let (sin_phi, cos_phi) = sin_cos_of_turn(u1);
+    DVec3::new(sin_theta * cos_phi, sin_theta * sin_phi, 2.0 * u0 - 1.0)
 }
 
 #[cfg(test)]
@@ -136,8 +132,9 @@ mod tests {
                 for axis in [DVec3::Z, -DVec3::Z, DVec3::X, DVec3::new(1.0, 1e-200, -1.0).normalize()] {
                     let (d, pdf) = sample_cosine_hemisphere(axis, [u0, u1]);
                     assert!(d.is_normalized() && pdf > 0.0 && d.dot(axis) > 0.0, "{u0} {u1} {axis}");
-                    assert!(sample_sphere_about(axis, [u0, u1]).is_normalized());
                 }
+                let uniform = sample_uniform_sphere([u0, u1]).length();
+                assert!((uniform - 1.0).abs() < 1e-15, "{u0} {u1}: {uniform}");
             }
         }
     }

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use vdf_scene::Phase;
 
-use crate::frame::{direction_about, sample_sphere_about};
+use crate::frame::{direction_about, sample_uniform_sphere};
 
 /// What a phase function does in a render.
 pub trait PhaseFunction {
@@ -42,7 +42,7 @@ impl PhaseFunction for Phase {
     #[inline]
     fn sample_direction(&self, from: DVec3, [u0, u1]: [f64; 2]) -> DVec3 {
         match *self {
-            Self::Isotropic => sample_sphere_about(from, [u0, u1]),
+            Self::Isotropic => sample_uniform_sphere([u0, u1]),
             Self::HenyeyGreenstein { g } => sample_lobe(g, from, [u0, u1]),
             Self::Rayleigh => {
                 // The root of cos³ θ + 3 cos θ = 8u − 4, by Cardano's formula. Its two terms have opposite signs, and their product is −1: from the larger
