@@ -189,6 +189,18 @@ fn files_beyond_the_limit_of_their_size() {
     assert_eq!(fs::read_dir(sandbox.path().join("v")).unwrap().count(), 0);
 }
 
+/// Where the system has a limit, what is larger is an error and no abort.
+#[cfg(target_os = "linux")]
+#[test]
+fn fields_that_do_not_fit_the_memory() {
+    let sandbox = Sandbox::new();
+    let script =
+        format!("ulimit -v 400000; exec '{}' voxelize --method amr --voxel 1.5 -j 1", env!("CARGO_BIN_EXE_vdf"));
+    let output = Command::new("sh").args(["-c", &script]).current_dir(sandbox.path()).output().unwrap();
+    let outcome = Outcome::new(&["sh", "-c", &script], &output);
+    outcome.failed(1, &["a voxel size of 1.5 needs", "bytes of memory, which are not there; use larger voxels"]);
+}
+
 /// Work outside of a pool of ours would start rayon's own, which panics if it cannot have its threads.
 #[test]
 fn a_comparison_needs_no_threads_but_its_own() {

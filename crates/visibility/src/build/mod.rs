@@ -29,7 +29,7 @@ impl Provers {
     ///
     /// # Errors
     /// If `progress` asks to stop, which is looked at before each of these; if voxels are needed and their size is not usable for these bounds,
-    /// or the grid exceeds `options.max_voxels`, or its voxels and field `options.max_bytes`. What is kept for a light and exceeds `max_bytes`, or 1 GiB
+    /// or the grid exceeds `options.max_voxels`, or its voxels and field `options.max_bytes` or what the system gives. What is kept for a light and exceeds `max_bytes`, or 1 GiB
     /// together with the others', is no error: see [`LightReport::fallback`].
     pub fn build(
         options: &ProverOptions,
@@ -72,6 +72,9 @@ impl Provers {
             max_bytes,
             bytes,
         )?;
+        if !is_there(bytes(grid.resolution())) {
+            return Err(VisibilityError::NoMemory { size: options.voxel_size, bytes: bytes(grid.resolution()) });
+        }
         let free = max_bytes.saturating_sub(bytes(grid.resolution())).min(lights_bytes);
         begin(progress, "voxels", 1)?;
         let occupied = report.step(
@@ -104,6 +107,11 @@ impl Provers {
 fn shared_bytes(kind: Option<FieldKind>, resolution: Resolution) -> u64 {
     let planes = kind.map_or(0, DistanceField::planes);
     (resolution.voxel_count() as u64).saturating_mul(planes).saturating_add(VoxelSet::bytes_of(resolution))
+}
+
+/// Whether the system gives so much memory: asked before what would end the program if it were not there.
+fn is_there(bytes: u64) -> bool {
+    usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
 }
 
 /// A step begins that has so many parts.
