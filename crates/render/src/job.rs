@@ -10,7 +10,7 @@ use crate::{
     Camera, Estimator, FilterSample, Integrator, LightPaths, PixelFilter, PreparedScene, Progress, RenderOptions,
     Sampler, SamplerKind,
     film::{Feature, tile_rects},
-    integrator::{PathRay, Tracer},
+    integrator::{Connected, PathRay, Tracer},
 };
 
 /// What to render, with all options resolved.
@@ -116,7 +116,7 @@ impl<'a> Job<'a> {
         'a: 'b,
     {
         let visibility = || self.prepared.visibility();
-        let light_paths = self.has_light_paths();
+        let light_paths = if self.has_light_paths() { Connected::Always } else { Connected::Never };
         let recording = |recorder| self.tracer_with(visibility().recorded(recorder), light_paths, progress);
         PathTracer {
             tracer: self.tracer_with(visibility().segment_first(self.options.segment_first), light_paths, progress),
@@ -143,7 +143,7 @@ impl<'a> Job<'a> {
     fn tracer_with<'b, R>(
         &self,
         visibility: Visibility<'b, R>,
-        light_paths: bool,
+        light_paths: Connected,
         progress: &'b dyn Progress,
     ) -> Tracer<'b, R>
     where

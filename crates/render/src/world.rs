@@ -12,7 +12,7 @@ use vdf_visibility::LightShape;
 
 use crate::{
     GridExtent, RegionSet,
-    bsdf::{Material, MaterialPoint},
+    bsdf::{Material, MaterialPoint, Prepared},
     light_paths,
     lights::Lights,
     media::Media,
@@ -145,7 +145,7 @@ impl World {
     /// Prepares `scene`. Cost: that of [`Bvh::new`].
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let mut materials = Vec::new();
+        let (mut materials, mut prepared) = (Vec::new(), Prepared::default());
         let mut surfaces: Vec<SurfaceData> = Vec::new();
         let (mut triangles, mut surface_of_triangle) = (Vec::new(), Vec::new());
         let (mut is_veil, mut veiled) = (Vec::new(), 0);
@@ -155,7 +155,7 @@ impl World {
                 _ => None,
             };
             let shading = plain.is_none().then(|| {
-                let material = Material::from(&s.bsdf);
+                let material = Material::new(&s.bsdf, &mut prepared);
                 let needs_tangents = material.needs_tangents();
                 materials.push(Shading { material, needs_tangents, attributes: s.attributes.clone() });
                 (materials.len() - 1) as u32

@@ -1,5 +1,7 @@
 //! A checksum of a scene, by which an image can say which scene it shows.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
 
@@ -16,7 +18,7 @@ impl Scene {
     /// the file are left out: they say how the scene is looked at.
     ///
     /// Meant to tell scenes apart that were changed by accident; 32 bits are no protection against intent. Cost: some
-    /// milliseconds for a million triangles.
+    /// milliseconds for a million triangles; each picture is read once.
     #[must_use]
     pub fn checksum(&self) -> u32 {
         // No `..`: who adds a field has to decide whether it belongs to the scene.
@@ -32,7 +34,7 @@ impl Scene {
             seed: _,
             warnings: _,
         } = self;
-        let mut sum = Sum(crc32fast::Hasher::new());
+        let mut sum = Sum::default();
         sum.count(surfaces.len());
         surfaces.iter().for_each(|surface| sum.surface(surface));
         sum.count(boundaries.len());
@@ -46,24 +48,34 @@ impl Scene {
         let IntegratorSettings { max_depth, rr_depth } = integrator;
         sum.option(*max_depth);
         sum.words(&[*rr_depth]);
-        sum.0.finalize()
+        sum.hasher.finalize()
     }
 }
 
 /// Every list is preceded by its length and every choice by its number, so that different scenes are different bytes.
-struct Sum(crc32fast::Hasher);
+#[derive(Default)]
+struct Sum {
+    hasher: crc32fast::Hasher,
+    /// Of pictures that were met before, by their addresses: many shapes may share a large one.
+    pictures: HashMap<*const Pixels, u32>,
+}
 
 impl Sum {
     fn words(&mut self, words: &[u32]) {
-        words.iter().for_each(|word| self.0.update(&word.to_le_bytes()));
+        // Many at once: a call takes longer than what it does for a word.
+        for words in words.chunks(16) {
+            let mut bytes = [0; 64];
+            bytes.chunks_exact_mut(4).zip(words).for_each(|(b, word)| b.copy_from_slice(&word.to_le_bytes()));
+            self.hasher.update(&bytes[..4 * words.len()]);
+        }
     }
 
     fn count(&mut self, n: usize) {
-        self.0.update(&(n as u64).to_le_bytes());
+        self.hasher.update(&(n as u64).to_le_bytes());
     }
 
     fn doubles(&mut self, numbers: &[f64]) {
-        numbers.iter().for_each(|x| self.0.update(&x.to_bits().to_le_bytes()));
+        numbers.iter().for_each(|x| self.hasher.update(&x.to_bits().to_le_bytes()));
     }
 
     fn colour(&mut self, colour: Rgb) {
@@ -84,7 +96,7 @@ impl Sum {
             let mut bytes = [0; 36];
             let numbers = vertices.iter().flat_map(|v| v.to_array());
             bytes.chunks_exact_mut(4).zip(numbers).for_each(|(b, x)| b.copy_from_slice(&x.to_bits().to_le_bytes()));
-            self.0.update(&bytes);
+            self.hasher.update(&bytes);
         }
     }
 
@@ -250,9 +262,17 @@ impl Sum {
         self.doubles(&[u.x, u.y, v.x, v.y, offset.x, offset.y]);
     }
 
-    fn pixels(&mut self, Pixels { width, height, rgb }: &Pixels) {
-        self.words(&[*width, *height]);
-        rgb.iter().for_each(|p| self.colour(*p));
+    fn pixels(&mut self, pixels: &Pixels) {
+        let Pixels { width, height, rgb } = pixels;
+        let sum = *self.pictures.entry(pixels).or_insert_with(|| {
+            let mut hasher = crc32fast::Hasher::new();
+            for pixels in rgb.chunks(1 << 10) {
+                let bytes: Vec<u8> = pixels.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect();
+                hasher.update(&bytes);
+            }
+            hasher.finalize()
+        });
+        self.words(&[*width, *height, sum]);
     }
 
     fn boundary(&mut self, Boundary { triangles, curved, interior, exterior }: &Boundary) {
@@ -306,7 +326,7 @@ impl Sum {
         self.doubles(&grid_from_world.to_cols_array());
         for values in grid.values().chunks(1 << 10) {
             let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_bits().to_le_bytes()).collect();
-            self.0.update(&bytes);
+            self.hasher.update(&bytes);
         }
     }
 

@@ -41,7 +41,7 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         change(&mut changed);
         assert_eq!(changed.checksum(), scene.checksum());
     }
-    let other: [fn(&mut Scene); 42] = [
+    let other: [fn(&mut Scene); 43] = [
         |_| {},
         |s| s.surfaces[0].triangles[0].vertices[1].z = s.surfaces[0].triangles[0].vertices[1].z.next_up(),
         |s| s.surfaces[0].triangles.swap(0, 1),
@@ -102,6 +102,10 @@ fn every_change_of_the_scene_changes_it_and_nothing_else_does() {
         |s| s.emitters.push(Emitter::Directional { direction: glam::DVec3::X, irradiance: Rgb::ONE }),
         |s| {
             let image = Arc::new(Pixels { width: 2, height: 2, rgb: vec![Rgb::ONE; 4] });
+            s.emitters.push(Emitter::Envmap { image, scale: 1.0, world_from_map: DMat4::IDENTITY });
+        },
+        |s| {
+            let image = Arc::new(Pixels { width: 2, height: 2, rgb: vec![Rgb::ONE, Rgb::ONE, Rgb::ONE, Rgb::ZERO] });
             s.emitters.push(Emitter::Envmap { image, scale: 1.0, world_from_map: DMat4::IDENTITY });
         },
     ];

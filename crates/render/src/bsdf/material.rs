@@ -6,8 +6,8 @@ use glam::{DVec3, dvec3};
 use vdf_scene::{Bsdf, Perturbation, Principled, PrincipledThin, Rgb, Roughness, Texture, TexturePoint};
 
 use super::{
-    fresnel, microfacet::Facets, perturbed::Perturbed, plastic::Coat, polarized_plastic::PolarizedPlastic, principled,
-    principled_thin,
+    fresnel, microfacet::Facets, perturbed::Perturbed, plastic::Coat, polarized_plastic::PolarizedPlastic,
+    prepared::Prepared, principled, principled_thin,
 };
 use crate::frame::sample_cosine_hemisphere;
 
@@ -75,8 +75,10 @@ pub(crate) struct MaterialSample {
 
 pub(super) const BLACK: (Rgb, f64) = (Rgb::ZERO, 0.0);
 
-impl From<&Bsdf> for Material {
-    fn from(bsdf: &Bsdf) -> Self {
+impl Material {
+    /// The material of a shape, of the scene that `prepared` is of.
+    pub(crate) fn new(bsdf: &Bsdf, prepared: &mut Prepared) -> Self {
+        let mut both = |of: &[Bsdf; 2]| Box::new([Self::new(&of[0], prepared), Self::new(&of[1], prepared)]);
         match bsdf {
             Bsdf::Lambertian { front, back } => {
                 Self::Diffuse { front: Texture::Constant(*front), back: Texture::Constant(*back) }
@@ -99,28 +101,28 @@ impl From<&Bsdf> for Material {
                 transmittance: transmittance.clone(),
             },
             Bsdf::Plastic { eta, diffuse, specular, nonlinear, roughness } => Self::Plastic {
-                coat: Coat::new(*eta, diffuse, specular, roughness.as_ref()),
+                coat: Coat::new(*eta, diffuse, specular, roughness.as_ref(), prepared),
                 diffuse: diffuse.clone(),
                 specular: specular.clone(),
                 nonlinear: *nonlinear,
                 roughness: roughness.clone(),
             },
             Bsdf::PolarizedPlastic { eta, diffuse, specular, roughness } => {
-                Self::PolarizedPlastic(Box::new(PolarizedPlastic::new(*eta, diffuse, specular, roughness)))
+                Self::PolarizedPlastic(Box::new(PolarizedPlastic::new(*eta, diffuse, specular, roughness, prepared)))
             }
             Bsdf::Filter { transmittance, share } => {
                 Self::Filter { transmittance: transmittance.clone(), share: *share }
             }
-            Bsdf::TwoSided(of) => Self::TwoSided(Box::new([(&of[0]).into(), (&of[1]).into()])),
-            Bsdf::Blend { weight, of } => {
-                Self::Blend { weight: weight.clone(), of: Box::new([(&of[0]).into(), (&of[1]).into()]) }
+            Bsdf::TwoSided(of) => Self::TwoSided(both(of)),
+            Bsdf::Blend { weight, of } => Self::Blend { weight: weight.clone(), of: both(of) },
+            Bsdf::Mask { opacity, of } => {
+                Self::Mask { opacity: opacity.clone(), of: Box::new(Self::new(of, prepared)) }
             }
-            Bsdf::Mask { opacity, of } => Self::Mask { opacity: opacity.clone(), of: Box::new(of.as_ref().into()) },
             Bsdf::Perturbed { by, flip_invalid_normals, shadowing, of } => Self::Perturbed(Box::new(Perturbed {
                 by: by.clone(),
                 flip_invalid_normals: *flip_invalid_normals,
                 shadowing: *shadowing,
-                of: of.as_ref().into(),
+                of: Self::new(of, prepared),
             })),
             Bsdf::Principled(p) => Self::Principled(p.clone()),
             Bsdf::PrincipledThin(p) => Self::PrincipledThin(p.clone()),

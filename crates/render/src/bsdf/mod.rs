@@ -14,6 +14,7 @@ mod microfacet;
 mod perturbed;
 mod plastic;
 mod polarized_plastic;
+mod prepared;
 mod principled;
 mod principled_thin;
 #[cfg(test)]
@@ -22,4 +23,5 @@ mod tests;
 pub(crate) use self::{
     diffuse::{eval_diffuse, sample_diffuse},
     material::{Lobe, Material, MaterialPoint},
+    prepared::Prepared,
 };

@@ -5,10 +5,12 @@
 //!
 //! *Deviation.* What passes a rough coat is tabulated at 64 cosines, as in Mitsuba, with a quadrature of our own.
 
-use glam::dvec3;
-use vdf_scene::{Microfacets, Rgb, Roughness, Texture, luminance};
+use std::sync::Arc;
 
-use super::{fresnel, microfacet::Facets};
+use glam::dvec3;
+use vdf_scene::{Microfacets, Rgb, Roughness, Texture};
+
+use super::{fresnel, microfacet::Facets, prepared::Prepared};
 
 /// Entries of the table of a rough coat.
 const ENTRIES: usize = 64;
@@ -24,31 +26,52 @@ pub(crate) struct Coat {
     pub(super) inside: f64,
     /// How much of the samples the coat gets where it reflects half of the light.
     pub(super) coat_share: f64,
-    /// What passes into the coat at equal steps of the cosine, if it is rough.
-    passes: Option<Vec<f64>>,
+    /// If it is rough.
+    rough: Option<Arc<RoughCoat>>,
+}
+
+/// What passes a rough coat, and what it sends back.
+#[derive(Debug)]
+pub(super) struct RoughCoat {
+    /// What passes into the coat at equal steps of the cosine.
+    passes: Vec<f64>,
+    inside: f64,
+}
+
+impl RoughCoat {
+    /// Cost: some milliseconds.
+    pub(super) fn new(facets: &Facets, eta: f64) -> Self {
+        let cosine = |i: usize| (i as f64 / (ENTRIES - 1) as f64).max(1e-6);
+        let passes = (0..ENTRIES).map(|i| share(facets, cosine(i), eta, true)).collect();
+        let back = |i| share(facets, cosine(i), 1.0 / eta, false) * cosine(i);
+        let inside = (0..ENTRIES).map(back).sum::<f64>() / ENTRIES as f64 * 2.0;
+        Self { passes, inside }
+    }
 }
 
 impl Coat {
-    pub(super) fn new(eta: f64, diffuse: &Texture, specular: &Texture, roughness: Option<&Roughness>) -> Self {
-        let (base, coat) = (f64::from(luminance(diffuse.mean())), f64::from(luminance(specular.mean())));
-        let coat_share = if base + coat > 0.0 { coat / (base + coat) } else { 0.5 };
+    pub(super) fn new(
+        eta: f64,
+        diffuse: &Texture,
+        specular: &Texture,
+        roughness: Option<&Roughness>,
+        prepared: &mut Prepared,
+    ) -> Self {
+        let coat_share = prepared.coat_share(diffuse, specular);
         let Some(roughness) = roughness else {
-            return Self { eta, inside: fresnel::diffuse_reflectance(1.0 / eta), coat_share, passes: None };
+            return Self { eta, inside: fresnel::diffuse_reflectance(1.0 / eta), coat_share, rough: None };
         };
-        let alpha = f64::from(luminance(roughness.alpha_u.mean())).max(super::material::LEAST_ALPHA);
-        let facets = Facets { kind: roughness.distribution, alpha: [alpha; 2] };
-        let cosine = |i: usize| (i as f64 / (ENTRIES - 1) as f64).max(1e-6);
-        let passes = (0..ENTRIES).map(|i| share(&facets, cosine(i), eta, true)).collect();
-        let back = |i| share(&facets, cosine(i), 1.0 / eta, false) * cosine(i);
-        let inside = (0..ENTRIES).map(back).sum::<f64>() / ENTRIES as f64 * 2.0;
-        Self { eta, inside, coat_share, passes: Some(passes) }
+        let alpha = prepared.mean_luminance(&roughness.alpha_u).max(super::material::LEAST_ALPHA);
+        let rough = prepared.rough_coat(&Facets { kind: roughness.distribution, alpha: [alpha; 2] }, eta);
+        Self { eta, inside: rough.inside, coat_share, rough: Some(rough) }
     }
 
     /// The share of light with this cosine that passes the coat.
     pub(super) fn passes(&self, cos: f64) -> f64 {
-        match &self.passes {
+        match &self.rough {
             None => 1.0 - fresnel::dielectric(cos, self.eta).reflected,
-            Some(table) => {
+            Some(rough) => {
+                let table = &rough.passes;
                 let place = cos.clamp(0.0, 1.0) * (ENTRIES - 1) as f64;
                 let i = (place as usize).min(ENTRIES - 2);
                 let share = place - i as f64;

@@ -6,11 +6,12 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use vdf_scene::{Rgb, Roughness, Texture, luminance};
+use vdf_scene::{Rgb, Roughness, Texture};
 
 use super::{
     fresnel,
     material::{BLACK, MaterialPoint, facets, reflection},
+    prepared::Prepared,
 };
 use crate::frame::sample_cosine_hemisphere;
 
@@ -26,9 +27,14 @@ pub(crate) struct PolarizedPlastic {
 }
 
 impl PolarizedPlastic {
-    pub(super) fn new(eta: f64, diffuse: &Texture, specular: &Texture, roughness: &Roughness) -> Self {
-        let (base, coat) = (f64::from(luminance(diffuse.mean())), f64::from(luminance(specular.mean())));
-        let coat_share = if base + coat > 0.0 { coat / (base + coat) } else { 0.5 };
+    pub(super) fn new(
+        eta: f64,
+        diffuse: &Texture,
+        specular: &Texture,
+        roughness: &Roughness,
+        prepared: &mut Prepared,
+    ) -> Self {
+        let coat_share = prepared.coat_share(diffuse, specular);
         Self { eta, diffuse: diffuse.clone(), specular: specular.clone(), roughness: roughness.clone(), coat_share }
     }
 

@@ -8,7 +8,10 @@ use vdf_scene::{
     TexturePoint, UvTransform, Wrap,
 };
 
-use super::material::{Lobe, Material, MaterialPoint};
+use super::{
+    material::{Lobe, Material, MaterialPoint},
+    prepared::Prepared,
+};
 use crate::{Sampler, chi_squared::assert_drawn_from};
 
 /// Where u and v neither grow as fast nor at right angles, on a slope under the shading normal.
@@ -181,7 +184,7 @@ fn samples_follow_the_density() {
     const SECTORS: usize = 8;
     const FINE: usize = 12;
     for (name, bsdf) in all() {
-        let material = Material::from(&bsdf);
+        let material = Material::new(&bsdf, &mut Prepared::default());
         for (k, wi) in directions().into_iter().enumerate() {
             let n = 12_000;
             let mut cells = vec![0_u64; RINGS * SECTORS + 1];
@@ -259,7 +262,7 @@ fn samples_follow_the_density() {
 #[test]
 fn no_material_makes_light() {
     for (name, bsdf) in all() {
-        let material = Material::from(&bsdf);
+        let material = Material::new(&bsdf, &mut Prepared::default());
         for (k, wi) in directions().into_iter().enumerate() {
             let n = 4000;
             let mut sum = 0.0;
@@ -284,7 +287,7 @@ fn no_material_makes_light() {
 #[test]
 fn materials_are_reciprocal() {
     for (name, bsdf) in all().into_iter().filter(|(_, bsdf)| !matches!(bsdf, Bsdf::Perturbed { .. })) {
-        let material = Material::from(&bsdf);
+        let material = Material::new(&bsdf, &mut Prepared::default());
         for wi in directions() {
             for wo in directions() {
                 // Which facets a thin sheet lets light through at depends on the side that it comes from, as in Mitsuba.
@@ -319,10 +322,10 @@ fn a_turned_material_is_the_nested_one() {
     let t = n.cross(s);
     let inner = |w: DVec3| dvec3(s.dot(w), t.dot(w), n.dot(w));
     let nested = metal(rough(Microfacets::Ggx, 0.15, 0.5));
-    let plain = Material::from(&nested);
+    let plain = Material::new(&nested, &mut Prepared::default());
     let by = |flip_invalid_normals, shadowing| {
         let of = Box::new(nested.clone());
-        Material::from(&Bsdf::Perturbed { by: leaning(), flip_invalid_normals, shadowing, of })
+        Material::new(&Bsdf::Perturbed { by: leaning(), flip_invalid_normals, shadowing, of }, &mut Prepared::default())
     };
     let mut compared = 0;
     for wi in directions() {
@@ -370,7 +373,7 @@ fn bumps_lean_as_the_surface_that_they_make() {
     let normal = (place(h, 0.0) - place(-h, 0.0)).cross(place(0.0, h) - place(0.0, -h)).normalize();
     let normal = if normal.z < 0.0 { -normal } else { normal };
     // A mirror shows it.
-    let mirror = Material::from(&perturbed(rising(scale), metal(None)));
+    let mirror = Material::new(&perturbed(rising(scale), metal(None)), &mut Prepared::default());
     let wi = dvec3(0.2, -0.1, 1.0).normalize();
     let sample = mirror.sample(wi, &at, 0.5, [0.5; 2]).expect("it is seen");
     let half = (wi + sample.wo).normalize();

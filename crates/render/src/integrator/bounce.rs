@@ -31,12 +31,25 @@ use crate::{
 /// A connection that brings less than this share of the light that the path has gathered is made as seldom as it brings less, and is then worth as much more.
 const LITTLE: f32 = 0.05;
 
+/// Whether the events of paths are connected to light paths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Connected {
+    /// They are not.
+    Never,
+    /// They are not, but the numbers of light paths are passed over: so the paths are those of `Always`.
+    PassedOver,
+    /// They are.
+    Always,
+}
+
 /// What a path has of its light path.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "one for each path, on the stack")]
 pub(super) enum LightPath {
     /// It is to have none.
     Never,
+    /// It is to have none, but its numbers are passed over with the first event that would need it.
+    PassedOver,
     /// It is drawn with the first event that needs it.
     NotYet,
     /// It was drawn; `None` if it ended nowhere.
@@ -93,6 +106,11 @@ impl<R: Recorder> Tracer<'_, R> {
         let query = ShadowQuery { from: point, to: light.point, emitter: beam.emitter, kind };
         let is_lit = density > 0.0 && density.is_finite() && self.visibility.unoccluded(&query, counters);
         is_lit.then_some(Bounce { place, light, density })
+    }
+
+    /// So many numbers [`Tracer::draw_bounce`] takes.
+    pub(super) fn numbers_of_bounce(&self) -> u32 {
+        3 + self.world.lights.numbers_of_origin()
     }
 
     /// What a ray from an emitter, which starts there, brings to `point`; its weight is what is scattered at the point over the cosine there and the density of the ray.

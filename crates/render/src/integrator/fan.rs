@@ -259,7 +259,8 @@ mod tests {
 
     use super::*;
     use crate::{
-        Estimator, PrepareOptions, PreparedScene, Quiet, Roulette, SamplerKind, integrator::stretch::stretches,
+        Estimator, PrepareOptions, PreparedScene, Quiet, Roulette, SamplerKind,
+        integrator::{Connected, stretch::stretches},
     };
 
     fn scene(name: &str, phase: Phase, lights: &[DVec3]) -> Scene {
@@ -273,7 +274,7 @@ mod tests {
 
     fn tracer(prepared: &PreparedScene, arch: Arch) -> Tracer<'_, NoRecorder> {
         Tracer {
-            light_paths: false,
+            light_paths: Connected::Never,
             world: prepared.world(),
             visibility: prepared.visibility(),
             settings: prepared.scene().integrator,

@@ -21,7 +21,7 @@ use vdf_visibility::{Counters, Recorder};
 
 use super::{
     Origin, Path, PathRay, Tracer, Vertex,
-    bounce::LightPath,
+    bounce::{Connected, LightPath},
     equiangular::{Equiangular, LightPlace},
     stretch::{distance_at_depth, stretches},
     to_f32,
@@ -44,9 +44,11 @@ impl<R: Recorder> Tracer<'_, R> {
         let (media, lights) = (&self.world.media, &self.world.lights);
         let near_enough = media.least_sigma_t().recip().min(NEAR * self.world.bounds.extent().length());
         let mut path = Path::new(ray);
-        if self.light_paths {
-            path.light_path = LightPath::NotYet;
-        }
+        path.light_path = match self.light_paths {
+            Connected::Never => LightPath::Never,
+            Connected::PassedOver => LightPath::PassedOver,
+            Connected::Always => LightPath::NotYet,
+        };
         while self.goes_on(&mut path, sampler) {
             let is_last = !self.may_scatter(path.depth + 1);
             if is_last && !lights.may_be_met() {
@@ -82,7 +84,7 @@ impl<R: Recorder> Tracer<'_, R> {
             };
             let arrival = self.density_of_arrival(&path.origin, point, &vertex);
             let mut light = self.direct_light(point, &vertex, &regions, arrival, place.as_ref(), sampler, counters);
-            let connected = self.connects(&path, path.depth);
+            let connected = self.connects(&mut path.light_path, path.depth, sampler);
             if connected {
                 light += self.light_by_bounce(&mut path, point, &vertex, &regions, sampler, counters);
             }

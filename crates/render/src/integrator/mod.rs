@@ -18,6 +18,7 @@ use vdf_geometry::{Hit, Segment};
 use vdf_scene::{IntegratorSettings, Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery, Visibility};
 
+pub(crate) use self::bounce::Connected;
 use self::bounce::{LightPath, share_beside_bounce};
 pub use self::kind::{Integrator, NoSegmentSamples, SegmentSamples, UnknownIntegrator};
 pub(crate) use self::raymarch::evenly;
@@ -38,7 +39,7 @@ pub(crate) struct Tracer<'a, R> {
     pub(crate) roulette: Roulette,
     pub(crate) estimator: Estimator,
     /// Whether paths are connected to paths of the lights.
-    pub(crate) light_paths: bool,
+    pub(crate) light_paths: Connected,
     /// The instruction set of vectors.
     pub(crate) arch: Arch,
     /// Whom a long path asks whether to stop.
@@ -418,8 +419,18 @@ impl<R: Recorder> Tracer<'_, R> {
 
     /// Whether an event with so many scattering events up to it is connected to a light path: one more has to be allowed.
     #[inline]
-    fn connects(&self, path: &Path, depth: u32) -> bool {
-        !matches!(path.light_path, LightPath::Never) && self.may_scatter(depth + 1)
+    fn connects(&self, light_path: &mut LightPath, depth: u32, sampler: &mut Sampler) -> bool {
+        match light_path {
+            LightPath::Never => false,
+            LightPath::PassedOver => {
+                if self.may_scatter(depth + 1) {
+                    sampler.skip(self.numbers_of_bounce());
+                    *light_path = LightPath::Never;
+                }
+                false
+            }
+            LightPath::NotYet | LightPath::Drawn(_) => self.may_scatter(depth + 1),
+        }
     }
 
     /// The estimate of the transmittance from a point in these regions to an emitter.

@@ -75,7 +75,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let vertex = Vertex::OnMaterial(surface, shading);
             arrival = self.density_of_arrival(&path.origin, surface.point, &vertex);
             let mut light = self.direct_light(surface.point, &vertex, &regions, arrival, None, sampler, counters);
-            connected = self.connects(path, path.depth + 1);
+            connected = self.connects(&mut path.light_path, path.depth + 1, sampler);
             if connected {
                 light += self.light_by_bounce(path, surface.point, &vertex, &regions, sampler, counters);
             }
