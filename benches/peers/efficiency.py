@@ -3,7 +3,7 @@
 
     python efficiency.py --vdf ../../target/release/vdf scene.xml ...
 
-For each scene both render --seeds pictures of --spp samples, in turns; scene files take the parameters width, height and spp. Time is the CPU time of rendering: for Mitsuba that of
+For each scene both render --seeds pictures of --spp samples, in turns; scene files take parameters for the size of the film (width and height, or --film). Time is the CPU time of rendering: for Mitsuba that of
 its process around mi.render, after a first picture that compiles; for vdf user and system time of a process less that of one with a single sample, so that neither
 loads. What is compared is what a user gets: vdf with its defaults, one variant of Mitsuba. The noise is the mean over pixels and channels of the variance of the pictures over
 (mean² + 0.01 mean(mean)²), which needs no reference as neither is biased; the means are printed, too. The rows are medians of the times and the noise of all seeds. With few seeds the
@@ -24,6 +24,7 @@ parser.add_argument("scenes", nargs="+", metavar="SCENE.xml")
 parser.add_argument("--vdf", required=True)
 parser.add_argument("--variant", default="llvm_ad_rgb")
 parser.add_argument("--size", type=int, default=64, help="width and height of the film")
+parser.add_argument("--film", default="width,height", help="the scenes' parameters for them, where they are called otherwise")
 parser.add_argument("--spp", type=int, default=64)
 parser.add_argument("--seeds", type=int, default=5)
 parser.add_argument("--threads", type=int, default=2)
@@ -43,7 +44,7 @@ dr.set_thread_count(args.threads)
 def ours(scene, seed, spp, out):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [args.vdf, "render", scene, "--spp", str(spp), "--seed", str(seed), "-j", str(args.threads), "-q", "-o", out]
-    for name in ("width", "height"):
+    for name in args.film.split(","):
         command += ["-D", f"{name}={args.size}"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
@@ -73,7 +74,7 @@ print(f"{args.size} x {args.size}, {args.spp} samples, {args.seeds} seeds, {args
 print("| scene | CPU s, Mitsuba | vdf | noise, Mitsuba | vdf | mean, vdf/Mitsuba | CPU s × noise, Mitsuba/vdf |")
 print("| --- | --- | --- | --- | --- | --- | --- |")
 for path in args.scenes:
-    scene = mi.load_file(path, width=args.size, height=args.size)
+    scene = mi.load_file(path, **{name: args.size for name in args.film.split(",")})
     theirs(scene, 0, args.spp)
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "a.exr")

@@ -241,6 +241,10 @@ impl Wrap {
     #[inline]
     #[must_use]
     pub fn pixel(self, i: i64, n: i64) -> i64 {
+        // Nearly always, and without a division.
+        if (0..n).contains(&i) {
+            return i;
+        }
         match self {
             Self::Clamp => i.clamp(0, n - 1),
             Self::Repeat => i.rem_euclid(n),
@@ -253,10 +257,18 @@ impl Wrap {
 }
 
 impl Pixels {
+    /// A pixel, and the next to the right, below, and both.
     #[inline]
-    fn pixel(&self, x: i64, y: i64, wrap: Wrap) -> Rgb {
-        let (x, y) = (wrap.pixel(x, self.width.into()), wrap.pixel(y, self.height.into()));
-        self.rgb.get((y * i64::from(self.width) + x) as usize).copied().unwrap_or_default()
+    fn four(&self, [x, y]: [i64; 2], wrap: Wrap) -> [Rgb; 4] {
+        let (width, height) = (i64::from(self.width), i64::from(self.height));
+        let [left, right] = [x, x + 1].map(|x| wrap.pixel(x, width));
+        let [above, below] = [y, y + 1].map(|y| wrap.pixel(y, height) * width);
+        [above + left, above + right, below + left, below + right].map(|i| self.pixel(i))
+    }
+
+    #[inline]
+    fn pixel(&self, i: i64) -> Rgb {
+        self.rgb.get(i as usize).copied().unwrap_or_default()
     }
 
     /// A place in pixels.
@@ -270,11 +282,8 @@ impl Pixels {
     /// How fast the luminance grows over the width and over the height of the picture, where it is linear between pixels.
     fn luminance_gradient(&self, uv: DVec2, wrap: Wrap) -> DVec2 {
         let (x, y) = self.place(uv);
-        let (x, y) = (x - 0.5, y - 0.5);
-        let (i, j) = (x.floor() as i64, y.floor() as i64);
-        let (fx, fy) = (x - x.floor(), y - y.floor());
-        let at = |x, y| f64::from(luminance(self.pixel(x, y, wrap)));
-        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
+        let ((i, fx), (j, fy)) = (floor(x - 0.5), floor(y - 0.5));
+        let [a, b, c, d] = self.four([i, j], wrap).map(|colour| f64::from(luminance(colour)));
         let by_pixel = DVec2::new((b - a) * (1.0 - fy) + (d - c) * fy, (c - a) * (1.0 - fx) + (d - b) * fx);
         by_pixel * DVec2::new(self.width.into(), self.height.into())
     }
@@ -282,17 +291,23 @@ impl Pixels {
     fn at(&self, uv: DVec2, filter: TextureFilter, wrap: Wrap) -> Rgb {
         let (x, y) = self.place(uv);
         match filter {
-            TextureFilter::Nearest => self.pixel(x.floor() as i64, y.floor() as i64, wrap),
+            TextureFilter::Nearest => self.four([floor(x).0, floor(y).0], wrap)[0],
             TextureFilter::Bilinear => {
-                let (x, y) = (x - 0.5, y - 0.5);
-                let (left, top) = (x.floor(), y.floor());
-                let (fx, fy) = ((x - left) as f32, (y - top) as f32);
-                let (i, j) = (left as i64, top as i64);
-                let row = |j| self.pixel(i, j, wrap) * (1.0 - fx) + self.pixel(i + 1, j, wrap) * fx;
-                row(j) * (1.0 - fy) + row(j + 1) * fy
+                let ((i, fx), (j, fy)) = (floor(x - 0.5), floor(y - 0.5));
+                let (fx, fy) = (fx as f32, fy as f32);
+                let [a, b, c, d] = self.four([i, j], wrap);
+                (a * (1.0 - fx) + b * fx) * (1.0 - fy) + (c * (1.0 - fx) + d * fx) * fy
             }
         }
     }
+}
+
+/// The largest integer that is not above x, and what is left: for |x| < 2⁶³. `f64::floor` would be a call where the processor may be an old one.
+#[inline]
+fn floor(x: f64) -> (i64, f64) {
+    let towards_zero = x as i64;
+    let whole = towards_zero - i64::from(x < towards_zero as f64);
+    (whole, x - whole as f64)
 }
 
 #[cfg(test)]
@@ -302,6 +317,24 @@ mod tests {
     fn picture() -> Arc<Pixels> {
         let rgb = [1.0, 2.0, 3.0, 4.0].map(Rgb::splat).to_vec();
         Arc::new(Pixels { width: 2, height: 2, rgb })
+    }
+
+    /// The same numbers as the library's, and pixels as by division.
+    #[test]
+    fn floors_and_wraps_are_those_of_the_definition() {
+        for x in
+            [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 1e-300, -1e-300, 2.999_999_9, -7.25, 1e17, -1e17, f64::from(u32::MAX)]
+        {
+            assert_eq!(floor(x), (x.floor() as i64, x - x.floor()), "{x}");
+        }
+        for n in [1, 2, 7] {
+            for i in -30..30 {
+                let mirrored = i64::rem_euclid(i, 2 * n);
+                assert_eq!(Wrap::Repeat.pixel(i, n), i.rem_euclid(n));
+                assert_eq!(Wrap::Clamp.pixel(i, n), i.clamp(0, n - 1));
+                assert_eq!(Wrap::Mirror.pixel(i, n), mirrored.min(2 * n - 1 - mirrored));
+            }
+        }
     }
 
     /// Values that Mitsuba 3.9.1 gives for the same picture.
