@@ -196,7 +196,43 @@ fn linear(image: &DynamicImage, raw: bool) -> (Pixels, usize) {
         unusable += 1;
         0.0
     };
-    let rgb = image.to_rgb32f();
-    let rgb = rgb.pixels().map(|p| Rgb::from_array(p.0.map(&mut channel))).collect();
+    // Of a byte there are 256 values; a power for each channel of a large picture takes longer than all else.
+    let is_bytes = matches!(
+        image,
+        DynamicImage::ImageRgb8(_)
+            | DynamicImage::ImageRgba8(_)
+            | DynamicImage::ImageLuma8(_)
+            | DynamicImage::ImageLumaA8(_)
+    );
+    let rgb = if is_bytes {
+        let table: Vec<f32> = (0..=255_u8).map(|byte| channel(f32::from(byte) / 255.0)).collect();
+        let colour = |p: &image::Rgb<u8>| Rgb::from_array(p.0.map(|byte| table[usize::from(byte)]));
+        image.to_rgb8().pixels().map(colour).collect()
+    } else {
+        image.to_rgb32f().pixels().map(|p| Rgb::from_array(p.0.map(&mut channel))).collect()
+    };
     (Pixels { width: image.width(), height: image.height(), rgb }, unusable)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of bytes has the bits that one of floating point numbers with the same values has, read as sRGB.
+    #[test]
+    fn bytes_are_decoded_as_other_numbers() {
+        let bytes =
+            DynamicImage::ImageLuma8(image::GrayImage::from_fn(16, 16, |x, y| image::Luma([(16 * y + x) as u8])));
+        // Sixteen bits, 257 times as large, are the same shares of what is white.
+        let words = DynamicImage::ImageLuma16(image::ImageBuffer::from_fn(16, 16, |x, y| {
+            image::Luma([257 * (16 * y + x) as u16])
+        }));
+        for raw in [false, true] {
+            let [a, b] = [&bytes, &words].map(|picture| linear(picture, raw));
+            assert_eq!((a.1, b.1), (0, 0));
+            let apart = a.0.rgb.iter().zip(&b.0.rgb).map(|(a, b)| (*a - *b).abs().max_element());
+            assert!(apart.fold(0.0, f32::max) < 1e-6, "{raw}");
+            assert!((a.0.rgb[255] - Rgb::ONE).abs().max_element() < 1e-6 && a.0.rgb[0] == Rgb::ZERO);
+        }
+    }
 }
