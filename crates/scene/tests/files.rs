@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use vdf_scene::{LoadOptions, Scene};
+use vdf_scene::{Emitter, LoadOptions, Scene};
 
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -72,6 +72,32 @@ fn values_of_pictures_that_are_no_light_are_warned_about() {
     let scene = Scene::load(&path, &LoadOptions::default()).expect("it loads");
     let told = |part: &str| scene.warnings.iter().any(|w| w.contains(part));
     assert!(told("scene.xml:1:") && told("6 values of") && told("they are taken as 0"), "{:?}", scene.warnings);
+}
+
+/// Loads a scene under the sky in that file, and gives the sky's pixels.
+fn sky(folder: &Path, name: &str, bytes: &[u8]) -> Result<Vec<[f32; 3]>, String> {
+    std::fs::write(folder.join(name), bytes).expect("it can be written");
+    let scene = format!(
+        "<integrator type='volpath'/><sensor type='perspective'/>\
+         <emitter type='envmap'><string name='filename' value='{name}'/></emitter>"
+    );
+    let scene = Scene::load(&naming(folder, &scene), &LoadOptions::default()).map_err(|e| e.to_string())?;
+    let Some(Emitter::Envmap { image, .. }) = scene.emitters.first() else { return Err("no sky".to_owned()) };
+    Ok(image.rgb.iter().map(|p| p.to_array()).collect())
+}
+
+/// Radiance's own programs write the first, others the second.
+#[test]
+fn radiance_files_have_two_signatures() {
+    let folder = folder("radiance");
+    for signature in ["#?RADIANCE", "#?RGBE"] {
+        let mut bytes = format!("{signature}\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 2\n").into_bytes();
+        // Mantissas of eight bits, and an exponent of 128 for 2⁰.
+        bytes.extend([128, 64, 0, 128].repeat(3));
+        bytes.extend([128, 128, 128, 130]);
+        let pixels = sky(&folder, "sky.hdr", &bytes).expect("it is read");
+        assert_eq!((pixels[0], pixels[3]), ([0.5, 0.25, 0.0], [2.0; 3]), "{signature}");
+    }
 }
 
 #[test]

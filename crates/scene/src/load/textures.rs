@@ -158,6 +158,10 @@ fn decoded(loader: &Loader<'_>, path: &Path, most: u64) -> Result<DynamicImage, 
     let (input, _) = loader.source.open(path, MAX_FILE_BYTES)?;
     let mut file = Vec::new();
     input.take(MAX_FILE_BYTES).read_to_end(&mut file)?;
+    // Two names for one format; the decoder knows the second.
+    if file.starts_with(b"#?RGBE\n") {
+        file.splice(..6, *b"#?RADIANCE");
+    }
     let reader = |file| ImageReader::new(std::io::Cursor::new(file)).with_guessed_format();
     let mut of_size = reader(&file)?;
     // TGA files have nothing to be known by.
