@@ -31,6 +31,7 @@ mod load;
 mod mesh;
 mod model;
 mod obj;
+mod pfm;
 mod ply;
 mod serialized;
 mod source;

@@ -100,6 +100,20 @@ fn radiance_files_have_two_signatures() {
     }
 }
 
+/// Its rows begin at the bottom; a file by another name is known by its first bytes.
+#[test]
+fn pfm_pictures_are_read() {
+    let folder = folder("pfm");
+    let mut bytes = b"Pf\n2 2\n-1.0\n".to_vec();
+    bytes.extend([0.5_f32, 1.0, 2.0, 7.0].iter().flat_map(|v| v.to_le_bytes()));
+    for name in ["sky.pfm", "sky.png"] {
+        assert_eq!(sky(&folder, name, &bytes).expect("it is read"), [2.0, 7.0, 0.5, 1.0].map(|v| [v; 3]));
+    }
+    bytes.pop();
+    let message = sky(&folder, "short.pfm", &bytes).expect_err("it is cut off");
+    assert!(message.contains("short.pfm\": the file ends after 15 of 16 bytes"), "{message}");
+}
+
 #[test]
 fn what_ends_too_soon_is_told_where() {
     let folder = folder("ends");

@@ -12,7 +12,7 @@ use super::document::{Element, Place};
 use super::properties::Object;
 use super::spectra::Weighed;
 use super::{Loader, features, plugins, transform};
-use crate::{Pixels, Rgb, SceneError, Texture, TextureFilter, UvTransform, Wrap};
+use crate::{Pixels, Rgb, SceneError, Texture, TextureFilter, UvTransform, Wrap, pfm};
 
 /// All pictures of a scene have at most this many pixels together; each takes twelve bytes.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -135,7 +135,7 @@ pub(super) fn pixels(loader: &Loader<'_>, name: &str, at: &Place, raw: bool) -> 
             let unreadable = |why: &dyn std::fmt::Display| {
                 at.error(
                     format!("cannot read \"{}\": {why}", path.display()),
-                    "pictures are PNG, JPEG, OpenEXR, Radiance HDR, BMP or TGA files; the path is relative to the folder of the scene file, or to a folder of a <path>",
+                    "pictures are PNG, JPEG, OpenEXR, Radiance HDR, PFM, BMP or TGA files; the path is relative to the folder of the scene file, or to a folder of a <path>",
                 )
             };
             let image = decoded(loader, &path, MAX_PIXELS.saturating_sub(used)).map_err(|e| unreadable(&e))?;
@@ -158,6 +158,9 @@ fn decoded(loader: &Loader<'_>, path: &Path, most: u64) -> Result<DynamicImage, 
     let (input, _) = loader.source.open(path, MAX_FILE_BYTES)?;
     let mut file = Vec::new();
     input.take(MAX_FILE_BYTES).read_to_end(&mut file)?;
+    if pfm::is_pfm(&file) {
+        return Ok(pfm::read(&file, most)?);
+    }
     // Two names for one format; the decoder knows the second.
     if file.starts_with(b"#?RGBE\n") {
         file.splice(..6, *b"#?RADIANCE");
