@@ -40,6 +40,7 @@ use std::path::Path;
 
 use document::{Element, Ids, OBJECT_TAGS, Place};
 use parameters::Parameters;
+use reader::Document;
 use search::Search;
 
 use crate::mesh::Attributes;
@@ -80,7 +81,7 @@ impl Scene {
     /// Loads a scene from disk or from memory, with the errors and the cost of [`Scene::load`].
     pub fn from_source(source: &SceneSource, options: &LoadOptions) -> Result<Self, SceneError> {
         let mut parameters = Parameters::new(&options.defines)?;
-        let (root, search) = reader::read(source, &mut parameters)?;
+        let Document { root, search, warnings } = reader::read(source, &mut parameters)?;
         parameters.check_all_used()?;
         features::check(&root, options.sensor.unwrap_or(0))?;
         let loader = Loader {
@@ -102,6 +103,9 @@ impl Scene {
             emitters: Vec::new(),
             area_emitters: HashSet::new(),
         };
+        for (at, message) in &warnings {
+            loader.warn(at, message);
+        }
         loader.scene(&root, options.sensor)
     }
 }

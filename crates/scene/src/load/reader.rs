@@ -21,12 +21,28 @@ const MAX_BYTES: u64 = 64 << 20;
 /// At most this many folders are looked through for each file.
 const MAX_SEARCH_FOLDERS: usize = 64;
 
-/// Reads the scene file with everything that it includes. The second answer is where its meshes are looked for.
-pub(super) fn read(source: &SceneSource, parameters: &mut Parameters) -> Result<(Element, Search), SceneError> {
-    let search = Search::default();
-    let mut reader = Reader { source, parameters, search, elements: 0, bytes: 0, open_files: Vec::new() };
+/// A scene file with everything that it includes.
+#[derive(Debug)]
+pub(super) struct Document {
+    pub(super) root: Element,
+    /// Where its meshes are looked for.
+    pub(super) search: Search,
+    pub(super) warnings: Vec<(Place, &'static str)>,
+}
+
+/// Reads the scene file with everything that it includes.
+pub(super) fn read(source: &SceneSource, parameters: &mut Parameters) -> Result<Document, SceneError> {
+    let mut reader = Reader {
+        source,
+        parameters,
+        search: Search::default(),
+        elements: 0,
+        bytes: 0,
+        open_files: Vec::new(),
+        warnings: Vec::new(),
+    };
     let root = reader.file(source.path(), None)?;
-    Ok((root, reader.search))
+    Ok(Document { root, search: reader.search, warnings: reader.warnings })
 }
 
 struct Reader<'a> {
@@ -37,6 +53,7 @@ struct Reader<'a> {
     bytes: u64,
     /// The chain of files from the scene file to the one that is being read.
     open_files: Vec<PathBuf>,
+    warnings: Vec<(Place, &'static str)>,
 }
 
 impl Reader<'_> {
@@ -68,7 +85,10 @@ impl Reader<'_> {
         let lines = Lines::new(text, Arc::from(path));
         let prepared = xml::prepare(text, MAX_ELEMENTS.saturating_sub(self.elements))
             .map_err(|e| lines.place(e.offset).error(e.message, ""))?;
-        let document = roxmltree::Document::parse(&prepared).map_err(|e| {
+        if let Some(offset) = prepared.behind {
+            self.warnings.push((lines.place(offset), "what follows the end of the scene is ignored, as in Mitsuba"));
+        }
+        let document = roxmltree::Document::parse(&prepared.text).map_err(|e| {
             let pos = e.pos();
             let at = match e {
                 // The parser gives no place to what lacks its end.

@@ -175,6 +175,21 @@ fn xml_errors_have_places() {
 }
 
 #[test]
+fn what_follows_the_scene_is_ignored_with_a_warning() {
+    for behind in ["<shape type='sphere'/>", "<oops/>", "modifications = []", "\u{200b}"] {
+        let loaded = load_with(&format!("{}\n <!-- -->{behind}\n", scene("")), &[], &[]).unwrap();
+        let expected = "s.xml:5:10: what follows the end of the scene is ignored, as in Mitsuba";
+        assert_eq!((loaded.surfaces.len(), loaded.warnings), (0, vec![expected.to_owned()]));
+    }
+    for behind in ["</scene>", "<shape type='sphere'>", "a < b"] {
+        assert!(load_with(&format!("{}{behind}", scene("")), &[], &[]).unwrap_err().to_string().contains("XML"));
+    }
+    let included = format!("<scene version='3.0.0'>{LIGHT}</scene>\nx");
+    let loaded = load_with(&scene("<include filename='a.xml'/>"), &[("a.xml", &included)], &[]).unwrap();
+    assert!(loaded.emitters.len() == 2 && loaded.warnings[0].starts_with("a.xml:2:1: "), "{:?}", loaded.warnings);
+}
+
+#[test]
 fn values_outside_their_range_are_refused() {
     let bsdf = |v| format!("<bsdf type='diffuse'><rgb name='reflectance' value='{v}'/></bsdf>");
     for bad in ["1.5", "-0.1", "nan", "inf", "1,2", "a", "", "1e400"] {

@@ -1,6 +1,6 @@
 //! A first pass over the text of a scene file, before the XML parser sees it.
 //!
-//! It makes comments legal that other programs write, and refuses what would take the parser more than linear time: the parser compares each
+//! It makes comments legal that other programs write, leaves out what follows the scene, and refuses what would take the parser more than linear time: the parser compares each
 //! attribute of an element with the others, and looks for each namespace in all that are open. A scene needs few of the former and none of the
 //! latter.
 
@@ -18,13 +18,29 @@ pub(super) struct Refusal {
     pub(super) message: String,
 }
 
-/// The text for the parser, in which every byte is where it was. `most_elements` bounds the elements. Whatever is not well formed ends the pass:
-/// the parser will stop at the same place, and has the better message.
-pub(super) fn prepare(text: &str, most_elements: usize) -> Result<Cow<'_, str>, Refusal> {
+/// The text for the parser.
+#[derive(Debug)]
+pub(super) struct Prepared<'a> {
+    /// Every byte is where it was.
+    pub(super) text: Cow<'a, str>,
+    /// Where something begins that is behind the root element, and so not in `text`.
+    pub(super) behind: Option<usize>,
+}
+
+/// Makes the text for the parser. `most_elements` bounds the elements. Whatever is not well formed ends the pass: the parser will stop at the same
+/// place, and has the better message.
+pub(super) fn prepare(text: &str, most_elements: usize) -> Result<Prepared<'_>, Refusal> {
     let bytes = text.as_bytes();
     let mut dashes = Vec::new();
     let (mut at, mut depth, mut elements) = (0, 0_usize, 0);
+    // The end of the root element, and the first thing behind it that XML does not allow there.
+    let (mut root_end, mut behind) = (None, None);
+    let mut is_whole = true;
     while let Some(start) = find(bytes, at, b"<") {
+        let is_beside = matches!(&bytes[start + 1..], [b'!', b'-', b'-', ..] | [b'?', ..]);
+        if root_end.is_some() && behind.is_none() {
+            behind = first_text(&text[at..start]).map(|offset| at + offset).or((!is_beside).then_some(start));
+        }
         let end = match &bytes[start + 1..] {
             [b'!', b'-', b'-', ..] => {
                 let end = find(bytes, start + 4, b"-->");
@@ -38,6 +54,7 @@ pub(super) fn prepare(text: &str, most_elements: usize) -> Result<Cow<'_, str>, 
             [b'!', b'[', ..] => find(bytes, start, b"]]>").map(|end| end + 3),
             [b'?', ..] => find(bytes, start, b"?>").map(|end| end + 2),
             [b'/', ..] => {
+                is_whole &= depth > 0;
                 depth = depth.saturating_sub(1);
                 find(bytes, start, b">").map(|end| end + 1)
             }
@@ -57,18 +74,39 @@ pub(super) fn prepare(text: &str, most_elements: usize) -> Result<Cow<'_, str>, 
                 end
             }
         };
-        let Some(end) = end else { break };
+        let Some(end) = end else {
+            is_whole = false;
+            break;
+        };
         at = end;
+        if depth == 0 && elements > 0 {
+            root_end.get_or_insert(end);
+        }
     }
+    if root_end.is_some() && behind.is_none() {
+        behind = first_text(&text[at..]).map(|offset| at + offset);
+    }
+    // A root element that ends too soon leaves end tags over: not to be passed over in silence.
+    if !is_whole || depth > 0 {
+        behind = None;
+    }
+    let text = &text[..root_end.filter(|_| behind.is_some()).unwrap_or(text.len())];
+    dashes.retain(|comment: &std::ops::Range<usize>| comment.end <= text.len());
     if dashes.is_empty() {
-        return Ok(Cow::Borrowed(text));
+        return Ok(Prepared { text: Cow::Borrowed(text), behind });
     }
     let mut out = text.to_owned();
     for comment in dashes {
         let without = text[comment.clone()].replace('-', ".");
         out.replace_range(comment, &without);
     }
-    Ok(Cow::Owned(out))
+    Ok(Prepared { text: Cow::Owned(out), behind })
+}
+
+/// Where the text begins, if there is more than white space.
+pub(super) fn first_text(text: &str) -> Option<usize> {
+    let trimmed = text.trim_start();
+    (!trimmed.is_empty()).then_some(text.len() - trimmed.len())
 }
 
 /// The end of the tag that begins at `start`; `None` if it is not well formed.
@@ -145,9 +183,9 @@ mod tests {
     #[test]
     fn comments_become_legal_and_all_else_stays() {
         let text = "<!-- a -- b --><a x='--'><!--é---><!-- -ok --></a>";
-        assert_eq!(prepare(text, 9).unwrap(), "<!-- a .. b --><a x='--'><!--é.--><!-- -ok --></a>");
+        assert_eq!(prepare(text, 9).unwrap().text, "<!-- a .. b --><a x='--'><!--é.--><!-- -ok --></a>");
         for same in ["<a><!-- b --></a>", "<a><![CDATA[<!-- -- -->]]></a>", "<?x <b> ?><a y=\"<!-- -- -->\"/>"] {
-            assert!(matches!(prepare(same, 9), Ok(Cow::Borrowed(text)) if text == same));
+            assert!(matches!(prepare(same, 9).unwrap().text, Cow::Borrowed(text) if text == same));
         }
     }
 
@@ -181,7 +219,25 @@ mod tests {
             "",
             "x",
         ] {
-            assert_eq!(prepare(text, 9).unwrap(), text);
+            assert_eq!(prepare(text, 9).unwrap().text, text);
+        }
+    }
+
+    #[test]
+    fn what_is_behind_the_root_is_left_out_if_it_is_well_formed() {
+        for root in ["<a/>", "<a><b>é</b></a>", "<!-- -- --><a></a>"] {
+            for behind in ["é", "<b/>", "<![CDATA[x]]>", "<a><b/></a> text", "x <!-- -- -->"] {
+                let text = format!("{root} <!-- b --><?c d?>\n{behind}\n");
+                let prepared = prepare(&text, 9).unwrap();
+                assert_eq!(prepared.text, root.replace(" -- ", " .. "));
+                assert_eq!(prepared.behind, Some(text.rfind(behind).unwrap()));
+            }
+            // As XML has it, or not well formed: for the parser.
+            for behind in ["", "\n", "<!-- b --> <?c d?>", "</a>", "<b>", "x <", "<b/></b>", "<!DOCTYPE a>"] {
+                let text = format!("{root}{behind}").replace(" -- ", " .. ");
+                let prepared = prepare(&text, 9).unwrap();
+                assert_eq!((prepared.text.as_ref(), prepared.behind), (text.as_str(), None));
+            }
         }
     }
 }
