@@ -1,6 +1,7 @@
 //! From XML text to a checked tree of elements: parameters substituted, includes spliced in, every element and
 //! attribute known by name, each with its place for messages.
 
+use std::collections::HashSet;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,7 +28,7 @@ pub(super) struct Document {
     pub(super) root: Element,
     /// Where its meshes are looked for.
     pub(super) search: Search,
-    pub(super) warnings: Vec<(Place, &'static str)>,
+    pub(super) warnings: Vec<(Place, String)>,
 }
 
 /// Reads the scene file with everything that it includes.
@@ -40,6 +41,7 @@ pub(super) fn read(source: &SceneSource, parameters: &mut Parameters) -> Result<
         bytes: 0,
         open_files: Vec::new(),
         warnings: Vec::new(),
+        files_with_text: HashSet::new(),
     };
     let root = reader.file(source.path(), None)?;
     Ok(Document { root, search: reader.search, warnings: reader.warnings })
@@ -53,7 +55,9 @@ struct Reader<'a> {
     bytes: u64,
     /// The chain of files from the scene file to the one that is being read.
     open_files: Vec<PathBuf>,
-    warnings: Vec<(Place, &'static str)>,
+    warnings: Vec<(Place, String)>,
+    /// The files that have text between their elements.
+    files_with_text: HashSet<Arc<Path>>,
 }
 
 impl Reader<'_> {
@@ -86,7 +90,8 @@ impl Reader<'_> {
         let prepared = xml::prepare(text, MAX_ELEMENTS.saturating_sub(self.elements))
             .map_err(|e| lines.place(e.offset).error(e.message, ""))?;
         if let Some(offset) = prepared.behind {
-            self.warnings.push((lines.place(offset), "what follows the end of the scene is ignored, as in Mitsuba"));
+            let message = "what follows the end of the scene is ignored, as in Mitsuba".to_owned();
+            self.warnings.push((lines.place(offset), message));
         }
         let document = roxmltree::Document::parse(&prepared.text).map_err(|e| {
             let pos = e.pos();
@@ -140,11 +145,7 @@ impl Reader<'_> {
         }
         for child in node.children() {
             if child.is_text() {
-                let text = child.text().unwrap_or_default();
-                if !text.trim().is_empty() {
-                    let at = lines.place(child.range().start);
-                    return Err(at.error(format!("text inside <{}>", element.tag), "values are written as attributes"));
-                }
+                self.text(child, lines, &element, allowed)?;
             }
             if child.is_element() {
                 let may_hold = match element.tag.as_str() {
@@ -164,6 +165,31 @@ impl Reader<'_> {
         }
         element.last = self.elements;
         Ok(element)
+    }
+
+    /// Text between elements says nothing, in Mitsuba as well. In an element that lacks its value it was meant to be that.
+    fn text(
+        &mut self,
+        node: roxmltree::Node<'_, '_>,
+        lines: &Lines<'_>,
+        parent: &Element,
+        allowed: &[&str],
+    ) -> Result<(), SceneError> {
+        if node.text().unwrap_or_default().trim().is_empty() {
+            return Ok(());
+        }
+        let source = node.document().input_text().get(node.range()).unwrap_or_default();
+        let at = lines.place(node.range().start + xml::first_text(source).unwrap_or(0));
+        let wants_value = allowed.contains(&"value") && !matches!(parent.tag.as_str(), "translate" | "scale");
+        if wants_value && parent.attributes.iter().all(|a| matches!(a.name.as_str(), "name" | "id")) {
+            return Err(at.error(format!("text inside <{}>", parent.tag), "values are written as attributes"));
+        }
+        if self.files_with_text.insert(lines.file.clone()) {
+            let message =
+                format!("text inside <{}> is ignored, as in Mitsuba: values are written as attributes", parent.tag);
+            self.warnings.push((at, message));
+        }
+        Ok(())
     }
 
     fn child(

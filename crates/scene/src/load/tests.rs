@@ -130,7 +130,6 @@ fn unknown_names_are_refused_with_the_nearest_one() {
         "did you mean \"flip_normals\"",
     );
     refused("<shape type='cube'><phase type='hg'/></shape>", "3:20", "takes no <phase>");
-    refused("<shape type='cube'/>x", "3:21", "text inside <scene>");
     refused("<shape type='cube'><string name='flip_normals' value='a'/></shape>", "3:20", "cannot be a <string>");
     refused("<film type='hdrfilm'/>", "3:1", "inside <sensor>");
     refused("<float name='a' value='1'><float name='b' value='1'/></float>", "3:27", "inside <float>");
@@ -187,6 +186,31 @@ fn what_follows_the_scene_is_ignored_with_a_warning() {
     let included = format!("<scene version='3.0.0'>{LIGHT}</scene>\nx");
     let loaded = load_with(&scene("<include filename='a.xml'/>"), &[("a.xml", &included)], &[]).unwrap();
     assert!(loaded.emitters.len() == 2 && loaded.warnings[0].starts_with("a.xml:2:1: "), "{:?}", loaded.warnings);
+}
+
+#[test]
+fn text_between_elements_is_ignored_with_one_warning_a_file() {
+    for (body, place, tag) in [
+        ("<shape type='cube'/>x", "3:21", "scene"),
+        ("<shape type='cube'>\n\u{200b}</shape>", "4:1", "shape"),
+        ("<shape type='cube'><transform name='to_world'> é<scale value='2'/></transform></shape>", "3:48", "transform"),
+        ("<shape type='sphere'><float name='radius' value='2'> 3</float></shape>", "3:54", "float"),
+        ("<shape type='cube'><![CDATA[x]]></shape> y", "3:20", "shape"),
+    ] {
+        let warnings = load(body).warnings;
+        let expected =
+            format!("s.xml:{place}: text inside <{tag}> is ignored, as in Mitsuba: values are written as attributes");
+        assert_eq!(warnings, [expected]);
+    }
+    let included = format!("<scene version='3.0.0'>{LIGHT}x</scene>");
+    let twice = "a<include filename='a.xml'/>b<include filename='a.xml'/>c";
+    let warnings = load_with(&scene(twice), &[("a.xml", &included)], &[]).unwrap().warnings;
+    assert!(warnings.len() == 2 && warnings[1].starts_with("a.xml:1:"), "{warnings:?}");
+    // Where it was meant to be the value.
+    let inside = |property: &str| format!("<bsdf type='diffuse' id='b'>{property}</bsdf>");
+    refused(&inside("<rgb name='reflectance'>1, 0, 0</rgb>"), "3:53", "text inside <rgb>");
+    refused(&inside("<spectrum name='reflectance'>400:1</spectrum>"), "3:58", "written as attributes");
+    refused("<default name='a'>1</default>", "3:19", "written as attributes");
 }
 
 #[test]
