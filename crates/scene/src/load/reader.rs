@@ -10,7 +10,7 @@ use super::document::{Attribute, Element, OBJECT_TAGS, PROPERTY_TAGS, Place};
 use super::lines::Lines;
 use super::parameters::Parameters;
 use super::search::Search;
-use super::{names, xml};
+use super::{features, names, xml};
 use crate::{SceneError, SceneSource};
 
 /// Includes nest at most this deep, as in Mitsuba.
@@ -140,6 +140,7 @@ impl Reader<'_> {
             attributes.push(Attribute { name: name.to_owned(), value, at });
         }
         let mut element = Element { serial, last: serial, tag, attributes, children: Vec::new(), at };
+        textured_spectrum(&mut element)?;
         if element.is_object() {
             element.require("type")?;
         }
@@ -302,6 +303,23 @@ fn allowed_attributes(tag: &str, at: &Place) -> Result<&'static [&'static str], 
             return Err(at.error(format!("<{tag}> is not supported"), names::suggest(tag, &known)));
         }
     })
+}
+
+/// A spectrum whose type is one of a texture's is that texture.
+fn textured_spectrum(element: &mut Element) -> Result<(), SceneError> {
+    let Some(kind) = element.attribute("type").filter(|_| element.tag == "spectrum") else { return Ok(()) };
+    let kind = kind.value.as_str();
+    if features::kinds("spectrum").contains(&kind) || !features::kinds("texture").contains(&kind) {
+        return Ok(());
+    }
+    if let Some(other) = element.attributes.iter().find(|a| matches!(a.name.as_str(), "value" | "filename")) {
+        return Err(other.at.error(
+            format!("<spectrum type=\"{kind}\"> has no attribute \"{}\"", other.name),
+            "it is a texture: write its properties inside of it",
+        ));
+    }
+    "texture".clone_into(&mut element.tag);
+    Ok(())
 }
 
 /// Whether the file is from before version 2.
