@@ -27,6 +27,8 @@ mod tests_mitsuba;
 #[cfg(test)]
 mod tests_surfaces;
 #[cfg(test)]
+mod tests_tolerance;
+#[cfg(test)]
 mod tests_volumes;
 mod textures;
 mod transform;

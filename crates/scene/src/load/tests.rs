@@ -174,46 +174,6 @@ fn xml_errors_have_places() {
 }
 
 #[test]
-fn what_follows_the_scene_is_ignored_with_a_warning() {
-    for behind in ["<shape type='sphere'/>", "<oops/>", "modifications = []", "\u{200b}"] {
-        let loaded = load_with(&format!("{}\n <!-- -->{behind}\n", scene("")), &[], &[]).unwrap();
-        let expected = "s.xml:5:10: what follows the end of the scene is ignored, as in Mitsuba";
-        assert_eq!((loaded.surfaces.len(), loaded.warnings), (0, vec![expected.to_owned()]));
-    }
-    for behind in ["</scene>", "<shape type='sphere'>", "a < b"] {
-        assert!(load_with(&format!("{}{behind}", scene("")), &[], &[]).unwrap_err().to_string().contains("XML"));
-    }
-    let included = format!("<scene version='3.0.0'>{LIGHT}</scene>\nx");
-    let loaded = load_with(&scene("<include filename='a.xml'/>"), &[("a.xml", &included)], &[]).unwrap();
-    assert!(loaded.emitters.len() == 2 && loaded.warnings[0].starts_with("a.xml:2:1: "), "{:?}", loaded.warnings);
-}
-
-#[test]
-fn text_between_elements_is_ignored_with_one_warning_a_file() {
-    for (body, place, tag) in [
-        ("<shape type='cube'/>x", "3:21", "scene"),
-        ("<shape type='cube'>\n\u{200b}</shape>", "4:1", "shape"),
-        ("<shape type='cube'><transform name='to_world'> é<scale value='2'/></transform></shape>", "3:48", "transform"),
-        ("<shape type='sphere'><float name='radius' value='2'> 3</float></shape>", "3:54", "float"),
-        ("<shape type='cube'><![CDATA[x]]></shape> y", "3:20", "shape"),
-    ] {
-        let warnings = load(body).warnings;
-        let expected =
-            format!("s.xml:{place}: text inside <{tag}> is ignored, as in Mitsuba: values are written as attributes");
-        assert_eq!(warnings, [expected]);
-    }
-    let included = format!("<scene version='3.0.0'>{LIGHT}x</scene>");
-    let twice = "a<include filename='a.xml'/>b<include filename='a.xml'/>c";
-    let warnings = load_with(&scene(twice), &[("a.xml", &included)], &[]).unwrap().warnings;
-    assert!(warnings.len() == 2 && warnings[1].starts_with("a.xml:1:"), "{warnings:?}");
-    // Where it was meant to be the value.
-    let inside = |property: &str| format!("<bsdf type='diffuse' id='b'>{property}</bsdf>");
-    refused(&inside("<rgb name='reflectance'>1, 0, 0</rgb>"), "3:53", "text inside <rgb>");
-    refused(&inside("<spectrum name='reflectance'>400:1</spectrum>"), "3:58", "written as attributes");
-    refused("<default name='a'>1</default>", "3:19", "written as attributes");
-}
-
-#[test]
 fn values_outside_their_range_are_refused() {
     let bsdf = |v| format!("<bsdf type='diffuse'><rgb name='reflectance' value='{v}'/></bsdf>");
     for bad in ["1.5", "-0.1", "nan", "inf", "1,2", "a", "", "1e400"] {

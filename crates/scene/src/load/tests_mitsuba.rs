@@ -466,21 +466,3 @@ fn area_lights_may_have_textures() {
     let plain = load(&format!("<shape type='rectangle'><emitter type='area'>{grey}</emitter></shape>"));
     assert_eq!(plain.surfaces[0].radiance, Some(Vec3::splat(7.0).into()));
 }
-
-/// Mitsuba makes no difference between the two.
-#[test]
-fn a_spectrum_of_a_textures_type_is_that_texture() {
-    let surface = |tag: &str| {
-        let texture = format!("<{tag} type='checkerboard' name='reflectance'><rgb name='color0' value='0.1'/></{tag}>");
-        let board = format!("<{tag} type='checkerboard' id='board'/>");
-        let light = "<shape type='rectangle'><emitter type='area'><ref id='board' name='radiance'/></emitter></shape>";
-        load(&format!("{board}<shape type='cube'><bsdf type='diffuse'>{texture}</bsdf></shape>{light}")).surfaces
-    };
-    let (spectra, textures) = (surface("spectrum"), surface("texture"));
-    assert_eq!(spectra[0].bsdf, textures[0].bsdf);
-    assert!(matches!(spectra[0].bsdf, Bsdf::Diffuse { reflectance: Texture::Checkerboard { .. } }));
-    assert!(matches!(spectra[1].radiance, Some(Texture::Checkerboard { .. })));
-    let bitmap = |more: &str| format!("<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'{more}/></bsdf>");
-    refused(&bitmap(""), "3:22", "no filename");
-    refused(&bitmap(" value='0.5'"), "3:65", "has no attribute \"value\"");
-}
