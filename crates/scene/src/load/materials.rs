@@ -36,6 +36,9 @@ const INDICES: [(&str, f64); 23] = [
     ("bromine", 1.661),
 ];
 
+/// A metal with a larger index reflects all light, but the fourth power of the index must fit into single precision.
+const LARGEST_INDEX: f32 = 1e9;
+
 /// What a shape without a BSDF has.
 pub(super) fn default_bsdf(emits: bool) -> Bsdf {
     Bsdf::lambertian(Rgb::splat(if emits { 0.0 } else { 0.5 }), Rgb::ZERO)
@@ -316,8 +319,15 @@ fn metal<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<[Rgb; 2], S
         // Mitsuba's own defaults, which are those of a mirror.
         (false, false) => Ok([Rgb::ZERO, Rgb::ONE]),
         _ => {
-            let eta = object.unbounded(loader, "eta", 0.0)?;
-            Ok([eta / outside, object.unbounded(loader, "k", 1.0)? / outside])
+            let mut part = |name, default| {
+                let value = object.signed(loader, name, default)? / outside;
+                if value.min_element() < 0.0 {
+                    let message = format!("\"{name}\" is negative: its sign changes nothing, as in Mitsuba");
+                    loader.warn(object.place_of(name), &message);
+                }
+                Ok(value.clamp(Rgb::splat(-LARGEST_INDEX), Rgb::splat(LARGEST_INDEX)))
+            };
+            Ok([part("eta", 0.0)?, part("k", 1.0)?])
         }
     }
 }

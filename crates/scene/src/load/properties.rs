@@ -14,6 +14,17 @@ use crate::{Rgb, SceneError, Texture};
 /// The colour of the spectrum that is 1 at each wavelength, with the primaries of sRGB and its white, D65; as Mitsuba 3.9.1 has it.
 const EQUAL_ENERGY: DVec3 = DVec3::new(1.204_793_93, 0.948_291, 0.908_916_06);
 
+/// What the channels of a colour may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Channels {
+    /// From 0 to 1.
+    Share,
+    /// At least 0.
+    Unbounded,
+    /// Any numbers.
+    Signed,
+}
+
 /// A nested object, or one that a `ref` stands for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nested<'a> {
@@ -192,23 +203,28 @@ impl<'a> Object<'a> {
         name: &'static str,
         default: f32,
     ) -> Result<Rgb, SceneError> {
-        self.colour(loader, name, default, Some(1.0), Weighed::ByDaylight)
+        self.colour(loader, name, default, Channels::Share, Weighed::ByDaylight)
     }
 
-    /// A colour whose channels are at least 0, as an index of refraction.
+    /// A colour whose channels are any numbers.
+    pub(super) fn signed(&mut self, loader: &Loader<'a>, name: &'static str, default: f32) -> Result<Rgb, SceneError> {
+        self.colour(loader, name, default, Channels::Signed, Weighed::ByDaylight)
+    }
+
+    /// A colour whose channels are at least 0.
     pub(super) fn unbounded(
         &mut self,
         loader: &Loader<'a>,
         name: &'static str,
         default: f32,
     ) -> Result<Rgb, SceneError> {
-        self.colour(loader, name, default, None, Weighed::ByDaylight)
+        self.colour(loader, name, default, Channels::Unbounded, Weighed::ByDaylight)
     }
 
     /// What an emitter emits. `<float>` makes a grey. A `<spectrum>` of one number is as bright at each wavelength, which is not white:
     /// white is daylight, which is weaker in red.
     pub(super) fn emission(&mut self, loader: &Loader<'a>, name: &'static str) -> Result<Rgb, SceneError> {
-        self.colour(loader, name, 1.0, None, Weighed::Equally)
+        self.colour(loader, name, 1.0, Channels::Unbounded, Weighed::Equally)
     }
 
     fn colour(
@@ -216,7 +232,7 @@ impl<'a> Object<'a> {
         loader: &Loader<'a>,
         name: &'static str,
         default: f32,
-        most: Option<f64>,
+        channels: Channels,
         weighed: Weighed,
     ) -> Result<Rgb, SceneError> {
         let nested = self.texture_element(name)?;
@@ -231,17 +247,23 @@ impl<'a> Object<'a> {
             "spectrum" => spectrum(loader, element, weighed)?,
             _ => DVec3::splat(number(element)?),
         };
+        let largest = f64::from(f32::MAX);
+        let (least, most, range) = match channels {
+            Channels::Share => (0.0, 1.0, "in [0, 1]"),
+            Channels::Unbounded => (0.0, largest, "at least 0 and fit into single precision"),
+            Channels::Signed => (-largest, largest, "finite and fit into single precision"),
+        };
         // A spectrum over wavelengths may be so pure that there is less than nothing of a primary; Mitsuba cuts that off, too.
-        let values = if element.tag == "spectrum" && !is_flat(element) {
-            values.max(DVec3::ZERO).min(most.map_or(DVec3::INFINITY, DVec3::splat))
+        let is_typed = element.attribute("type").is_some();
+        let is_cut = !(is_flat(element) || (is_typed && channels == Channels::Signed));
+        let values = if element.tag == "spectrum" && is_cut {
+            values.max(DVec3::ZERO).min(if channels == Channels::Share { DVec3::ONE } else { DVec3::INFINITY })
         } else {
             values
         };
-        let limit = most.unwrap_or(f64::from(f32::MAX));
-        if values.cmpge(DVec3::ZERO).all() && values.cmple(DVec3::splat(limit)).all() {
+        if values.cmpge(DVec3::splat(least)).all() && values.cmple(DVec3::splat(most)).all() {
             return Ok(values.as_vec3());
         }
-        let range = if most.is_some() { "in [0, 1]" } else { "at least 0 and fit into single precision" };
         Err(element.at.error(
             format!("\"{name}\" is {}, {}, {}", values.x, values.y, values.z),
             format!("each channel must be {range}"),
@@ -270,7 +292,7 @@ impl<'a> Object<'a> {
     ) -> Result<Texture, SceneError> {
         match self.texture_element(name)? {
             Some(nested) => textures::read(loader, nested),
-            None => self.colour(loader, name, default, None, Weighed::ByDaylight).map(Texture::Constant),
+            None => self.colour(loader, name, default, Channels::Unbounded, Weighed::ByDaylight).map(Texture::Constant),
         }
     }
 

@@ -1,5 +1,7 @@
 //! What Mitsuba lets pass, and so does the loader, mostly with a warning.
 
+use glam::Vec3;
+
 use super::tests::{LIGHT, load, load_with, refused, scene};
 use crate::{Bsdf, Texture};
 
@@ -59,4 +61,35 @@ fn a_spectrum_of_a_textures_type_is_that_texture() {
     let bitmap = |more: &str| format!("<bsdf type='diffuse'><spectrum name='reflectance' type='bitmap'{more}/></bsdf>");
     refused(&bitmap(""), "3:22", "no filename");
     refused(&bitmap(" value='0.5'"), "3:65", "has no attribute \"value\"");
+}
+
+/// Fresnel's equations know the squares of both parts alone.
+#[test]
+fn indices_of_metals_may_be_negative() {
+    let metal = |inner: &str| {
+        let loaded = load(&format!("<shape type='cube'><bsdf type='roughconductor'>{inner}</bsdf></shape>"));
+        match loaded.surfaces[0].bsdf.clone() {
+            Bsdf::Conductor { eta, k, .. } => (eta, k, loaded.warnings),
+            other => panic!("{other:?}"),
+        }
+    };
+    let (eta, k, warnings) = metal("<rgb name='eta' value='-0.05, 4, 4.5'/><rgb name='k' value='1, -0.5, 0'/>");
+    assert_eq!((eta, k), (Vec3::new(-0.05, 4.0, 4.5), Vec3::new(1.0, -0.5, 0.0)));
+    let expected = ["eta", "k"].map(|name| format!("\"{name}\" is negative: its sign changes nothing, as in Mitsuba"));
+    assert_eq!(warnings.len(), 2, "{warnings:?}");
+    assert!(warnings.iter().zip(expected).all(|(w, e)| w.starts_with("s.xml:3:") && w.ends_with(&e)), "{warnings:?}");
+    for flat in [
+        "<float name='eta' value='-2'/>",
+        "<spectrum name='eta' value='-2'/>",
+        "<spectrum name='eta' type='uniform'><float name='value' value='-2'/></spectrum>",
+    ] {
+        let (eta, _, warnings) = metal(flat);
+        assert_eq!((eta, warnings.len()), (Vec3::splat(-2.0), 1), "{flat}");
+    }
+    // What would overflow in these equations reflects all light.
+    assert_eq!(metal("<rgb name='eta' value='-1e30, 1e30, 1'/>").0, Vec3::new(-1e9, 1e9, 1.0));
+    for bad in ["1e39", "nan", "-inf"] {
+        refused(&format!("<bsdf type='conductor'><rgb name='eta' value='{bad}'/></bsdf>"), "3:24", "");
+    }
+    refused("<bsdf type='conductor'><float name='ext_eta' value='-1'/></bsdf>", "3:24", "");
 }
