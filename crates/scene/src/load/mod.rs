@@ -143,8 +143,13 @@ struct Loader<'a> {
 impl<'a> Loader<'a> {
     fn warn(&self, at: &Place, message: &str) {
         let mut warnings = self.warnings.borrow_mut();
+        let text = shown(&format!("{at}: {message}"));
+        // A BSDF is read again for each shape that refers to it.
+        if warnings.contains(&text) {
+            return;
+        }
         match warnings.len().cmp(&MAX_WARNINGS) {
-            Ordering::Less => warnings.push(shown(&format!("{at}: {message}"))),
+            Ordering::Less => warnings.push(text),
             Ordering::Equal => warnings.push("more warnings are not shown".to_owned()),
             Ordering::Greater => {}
         }

@@ -93,3 +93,12 @@ fn indices_of_metals_may_be_negative() {
     }
     refused("<bsdf type='conductor'><float name='ext_eta' value='-1'/></bsdf>", "3:24", "");
 }
+
+/// A BSDF is read where it stands, and again for each shape that refers to it.
+#[test]
+fn a_warning_is_told_once() {
+    let bsdf = "<bsdf type='conductor' id='b'><float name='eta' value='-1'/></bsdf>";
+    let shapes = "<shape type='cube'><ref id='b'/></shape>".repeat(3);
+    let warnings = load(&format!("{bsdf}{shapes}")).warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("negative"), "{warnings:?}");
+}
