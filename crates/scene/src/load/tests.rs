@@ -328,7 +328,6 @@ fn traps_around_shapes() {
         "4:39",
         "\"interior\"",
     );
-    refused(&format!("{FOG}\n<shape type='cube'><bsdf type='null'/><ref id='fog'/></shape>"), "4:39", "\"interior\"");
     let glowing = "<shape type='cube'><bsdf type='null'/><emitter type='area'/><medium type='homogeneous' name='interior'/></shape>";
     refused(glowing, "3:1", "area emitter on the boundary");
     let nothing = load("<shape type='cube'><bsdf type='null'/></shape>");

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::tests::{LIGHT, load, load_with, refused, scene};
+use super::tests::{FOG, LIGHT, load, load_with, refused, scene};
 use crate::{Bsdf, Texture};
 
 #[test]
@@ -101,4 +101,19 @@ fn a_warning_is_told_once() {
     let shapes = "<shape type='cube'><ref id='b'/></shape>".repeat(3);
     let warnings = load(&format!("{bsdf}{shapes}")).warnings;
     assert!(warnings.len() == 1 && warnings[0].contains("negative"), "{warnings:?}");
+}
+
+#[test]
+fn a_medium_of_a_shape_without_a_name_is_ignored() {
+    for medium in ["<medium type='homogeneous'/>", "<ref id='fog'/>"] {
+        let loaded = load(&format!("{FOG}\n<shape type='cube'><bsdf type='null'/>{medium}{medium}</shape>"));
+        assert!(loaded.boundaries.is_empty());
+        assert!(
+            loaded.warnings[0].starts_with("s.xml:4:39: a medium of a shape without a name"),
+            "{:?}",
+            loaded.warnings
+        );
+    }
+    let wrong = "<shape type='cube'><medium type='homogeneous'><float name='g' value='1'/></medium></shape>";
+    refused(wrong, "3:47", "no property \"g\"");
 }

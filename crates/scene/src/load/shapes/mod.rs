@@ -235,14 +235,22 @@ fn media<'a>(
         let slot = match nested.name {
             Some("interior") => &mut interior,
             Some("exterior") => &mut exterior,
-            other => {
+            Some(other) => {
                 return Err(nested.at.error(
-                    format!("the medium of a shape is named \"{}\"", other.unwrap_or_default()),
+                    format!("the medium of a shape is named \"{other}\""),
                     format!(
                         "write name=\"interior\" or name=\"exterior\" on it; Mitsuba ignores any other; {}",
-                        names::suggest(other.unwrap_or_default(), &["interior", "exterior"])
+                        names::suggest(other, &["interior", "exterior"])
                     ),
                 ));
+            }
+            None => {
+                let message = "a medium of a shape without a name is ignored, as in Mitsuba: \
+                               write name=\"interior\" or name=\"exterior\" on it";
+                loader.warn(nested.at, message);
+                // Read all the same, so that it cannot hide a mistake.
+                objects::medium(loader, nested.object)?;
+                continue;
             }
         };
         if slot.is_some() {
