@@ -457,14 +457,20 @@ impl<'a> Object<'a> {
         let Some((child, target, _)) = self.children.iter().find(|(.., used)| !used) else { return Ok(()) };
         if let Some(target) = target {
             let message = format!("{} takes no <{}>", self.describe(), target.tag);
-            return Err(child.at.error(message, names::suggest(&target.tag, &self.asked_objects)));
+            return Err(child.at.error(message, names::suggest(&target.tag, &without_repeats(self.asked_objects))));
         }
         let name = child.require("name")?;
         Err(child.at.error(
             format!("{} has no property \"{name}\"", self.describe()),
-            names::suggest(name, &self.asked_properties),
+            names::suggest(name, &without_repeats(self.asked_properties)),
         ))
     }
+}
+
+/// The names in their order, each once: some are asked for in several ways.
+fn without_repeats(names: Vec<&'static str>) -> Vec<&'static str> {
+    let mut seen = HashSet::new();
+    names.into_iter().filter(|name| seen.insert(*name)).collect()
 }
 
 pub(super) fn number(element: &Element) -> Result<f64, SceneError> {

@@ -133,6 +133,8 @@ fn unknown_names_are_refused_with_the_nearest_one() {
     refused("<shape type='cube'><string name='flip_normals' value='a'/></shape>", "3:20", "cannot be a <string>");
     refused("<film type='hdrfilm'/>", "3:1", "inside <sensor>");
     refused("<float name='a' value='1'><float name='b' value='1'/></float>", "3:27", "inside <float>");
+    let vector = "<shape type='cube'><emitter type='area'><vector name='r' value='1'/></emitter></shape>";
+    refused(vector, "3:41", "has no property \"r\"\n  help: supported: radiance, sampling_weight");
     refused("<texture type='wood' id='a'/>", "3:10", "texture type \"wood\" is not supported");
     refused("<texture type='bitmap' id='a'/>", "3:1", "no filename");
 }
