@@ -178,6 +178,12 @@ fn envmap<'a>(loader: &Loader<'a>, object: &mut Object<'a>) -> Result<Emitter, S
 
 /// The radiance of an area light.
 pub(super) fn area_emitter<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<Texture, SceneError> {
+    if let Some(kind) = element.attribute("type").filter(|kind| kind.value != "area")
+        && features::kinds("emitter").contains(&kind.value.as_str())
+    {
+        let message = format!("emitter \"{}\" cannot be inside of a shape: only an area light can", kind.value);
+        return Err(kind.at.error(message, "put it directly inside <scene>, with a to_world of its own"));
+    }
     let mut object = Object::new(loader, element, &["area"])?;
     let radiance = match object.texture_element("radiance")? {
         Some(nested) if textures::varies(nested) => textures::read(loader, nested)?,

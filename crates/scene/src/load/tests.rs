@@ -288,6 +288,8 @@ fn emitters_are_read() {
     assert_eq!(scene.surfaces[0].bsdf, Bsdf::lambertian(Vec3::ZERO, Vec3::ZERO));
     assert_eq!(scene.emitters[1], Emitter::Constant { radiance: Vec3::ONE });
     refused("<emitter type='area'/>", "3:1", "no shape");
+    refused("<shape type='sphere'><emitter type='spot'/></shape>", "3:31", "\"spot\" cannot be inside of a shape");
+    refused("<shape type='sphere'><emitter type='sopt'/></shape>", "3:31", "\"sopt\" is not supported");
     refused("<emitter type='constant'/>\n<emitter type='constant'/>", "4:1", "second environment emitter");
     let dark = load_with(&format!("{HEAD}<sensor type='perspective'>{FILM}</sensor></scene>"), &[], &[]).unwrap();
     assert!(dark.warnings[0].contains("no emitter"));
