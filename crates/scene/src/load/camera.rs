@@ -39,7 +39,7 @@ pub(super) fn read<'a>(loader: &mut Loader<'a>, element: &'a Element) -> Result<
     let far_clip = object.float_where("far_clip", 1e4, |v| v > near_clip, "more than near_clip")?;
     // As in Mitsuba, the camera's scale moves the near plane, and the far one stays as far behind it.
     let (near_clip, far_clip) = (near_clip * scale.z, far_clip + near_clip * (scale.z - 1.0));
-    let lens = lens(loader, &mut object, far_clip)?;
+    let lens = lens(&mut object, far_clip)?;
     let film = match object.at_most_one("film")? {
         Some(film) => film::read(loader, film.object)?,
         None => film::default(),
@@ -99,9 +99,10 @@ pub(super) fn rigid(loader: &Loader<'_>, object: &Object<'_>, m: DMat4) -> Resul
     Ok(DMat4::from_cols(left.extend(0.0), up.extend(0.0), forward.extend(0.0), m.w_axis))
 }
 
-fn lens(loader: &Loader<'_>, object: &mut Object<'_>, far_clip: f64) -> Result<Option<Lens>, SceneError> {
+fn lens(object: &mut Object<'_>, far_clip: f64) -> Result<Option<Lens>, SceneError> {
     if object.kind() != "thinlens" {
-        object.without_effect(loader, &["focus_distance"])?;
+        // Mitsuba reads it of every camera, and its users copy it from one to the next.
+        object.float("focus_distance")?;
         return Ok(None);
     }
     if !object.has("aperture_radius") {
