@@ -13,6 +13,14 @@ const MAX_DEPTH_OF_PRB: i64 = 6;
 const MOST_WRAPPERS: usize = 4;
 const MOST: i64 = u32::MAX as i64;
 
+/// Depth from which Russian roulette is played.
+const RR_DEPTH: u32 = 5;
+
+/// What a scene without an integrator has: `volpath` with its defaults.
+pub(super) fn default() -> IntegratorSettings {
+    IntegratorSettings { max_depth: None, rr_depth: RR_DEPTH }
+}
+
 /// Reads the integrator.
 pub(super) fn read<'a>(loader: &Loader<'a>, element: &'a Element) -> Result<IntegratorSettings, SceneError> {
     read_within(loader, element, 0)
@@ -45,14 +53,14 @@ fn read_within<'a>(loader: &Loader<'a>, element: &'a Element, depth: usize) -> R
         if emitter + object.integer("bsdf_samples", both, 0..=MOST)? == 0 {
             return Err(object.error("no samples", "emitter_samples or bsdf_samples must be positive"));
         }
-        IntegratorSettings { max_depth: Some(2), rr_depth: 5 }
+        IntegratorSettings { max_depth: Some(2), rr_depth: RR_DEPTH }
     } else {
         if object.kind() == "volpathmis" {
             object.boolean("use_spectral_mis", true)?;
         }
         let default = if object.kind().starts_with("prb") { MAX_DEPTH_OF_PRB } else { -1 };
         let max_depth = u32::try_from(object.integer("max_depth", default, -1..=MOST)?).ok();
-        let rr_depth = object.integer("rr_depth", 5, 1..=MOST)?;
+        let rr_depth = object.integer("rr_depth", RR_DEPTH.into(), 1..=MOST)?;
         IntegratorSettings { max_depth, rr_depth: u32::try_from(rr_depth).unwrap_or(u32::MAX) }
     };
     object.finish()?;

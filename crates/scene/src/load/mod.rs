@@ -197,10 +197,8 @@ impl<'a> Loader<'a> {
                 }
             }
         }
-        let missing =
-            |what: &str, how: &str| Err(root.at.error(format!("the scene has no {what}"), format!("add {how}")));
         if sensors.is_empty() {
-            return missing("sensor", "<sensor type=\"perspective\">");
+            return Err(root.at.error("the scene has no sensor", "add <sensor type=\"perspective\">"));
         }
         let Some(&sensor) = sensors.get(chosen.unwrap_or(0)) else {
             let message = format!("the scene has no sensor {}", chosen.unwrap_or(0));
@@ -209,9 +207,14 @@ impl<'a> Loader<'a> {
         if chosen.is_none() && sensors.len() > 1 {
             self.warn(&sensor.at, &format!("the scene has {} sensors: the first is used", sensors.len()));
         }
-        let Some(integrator) = integrator else { return missing("integrator", "<integrator type=\"volpath\"/>") };
         let camera = camera::read(&mut self, sensor)?;
-        let integrator = integrator::read(&self, integrator)?;
+        let integrator = match integrator {
+            Some(element) => integrator::read(&self, element)?,
+            None => {
+                self.warn(&root.at, "the scene has no integrator: rendered as volpath");
+                integrator::default()
+            }
+        };
         let unused = root.children.iter().find(|e| {
             e.tag == "emitter"
                 && e.attribute("type").is_some_and(|kind| kind.value == "area")

@@ -378,11 +378,12 @@ fn unbounded_fog_under_an_infinite_sky_is_refused() {
 }
 
 #[test]
-fn sensor_film_and_integrator_are_needed_once() {
+fn a_sensor_is_needed_and_an_integrator_given_once() {
     refused_text("<scene version='3.0.0'><integrator type='volpath'/></scene>", &[], "s.xml:1:1", "no sensor");
     let default = load_with(&format!("{HEAD}<sensor type='perspective'/></scene>"), &[], &[]).unwrap().film;
     assert_eq!((default.width, default.height), (768, 576));
-    refused_text("<scene version='3.0.0'><sensor type='perspective'/></scene>", &[], "s.xml:1:1", "no integrator");
+    let second = "<integrator type='path'/>";
+    refused(second, "3:1", "a second integrator");
 }
 
 /// A shape that single precision would make another one is refused; one whose vertices can be said exactly is not, nor one without extent.

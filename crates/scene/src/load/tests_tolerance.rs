@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::tests::{FOG, LIGHT, load, load_with, refused, scene};
-use crate::{Bsdf, Texture};
+use crate::{Bsdf, IntegratorSettings, Texture};
 
 #[test]
 fn what_follows_the_scene_is_ignored_with_a_warning() {
@@ -116,4 +116,14 @@ fn a_medium_of_a_shape_without_a_name_is_ignored() {
     }
     let wrong = "<shape type='cube'><medium type='homogeneous'><float name='g' value='1'/></medium></shape>";
     refused(wrong, "3:47", "no property \"g\"");
+}
+
+/// Mitsuba loads it, too, and renders it with the integrator that it is told.
+#[test]
+fn a_scene_without_an_integrator_is_rendered_as_volpath() {
+    let text = format!("<scene version='3.0.0'><sensor type='perspective'/>{LIGHT}</scene>");
+    let loaded = load_with(&text, &[], &[]).unwrap();
+    assert_eq!(loaded.integrator, IntegratorSettings { max_depth: None, rr_depth: 5 });
+    assert_eq!(loaded.integrator, load("").integrator);
+    assert_eq!(loaded.warnings, ["s.xml:1:1: the scene has no integrator: rendered as volpath"]);
 }
