@@ -21,7 +21,8 @@ use crate::{
 
 fn main() -> ExitCode {
     survive_limits();
-    if asks_for_json() {
+    let json = asks_for_json();
+    if json {
         speak_json();
     }
     let arguments = match Arguments::try_parse() {
@@ -29,9 +30,10 @@ fn main() -> ExitCode {
         // Help and version go to stdout, usage errors to stderr; clap knows which, but not whether they arrived.
         Err(message) => {
             let code = u8::try_from(message.exit_code()).unwrap_or(2);
-            if asks_for_json() && message.use_stderr() {
-                let message = message.to_string();
-                return Failure::Usage(anyhow!("{}", message.trim_start_matches("error: ").trim_end())).report();
+            if json && message.use_stderr() {
+                let text = message.to_string();
+                let text = text.strip_prefix("error: ").unwrap_or(&text).trim_end();
+                return Failure::Usage(anyhow!("{text}")).report();
             }
             return if message.print().is_ok() { code.into() } else { ExitCode::FAILURE };
         }

@@ -252,8 +252,12 @@ fn build_by_default(
         Ok(built) => return Ok((method, built)),
         Err(error) => error,
     };
-    let VisibilityError::Voxel(voxel_error) = &error else { return Err(error) };
-    if let Some(smallest) = voxel_error.smallest_usable()
+    let smallest = match &error {
+        VisibilityError::Voxel(error) => error.smallest_usable(),
+        VisibilityError::NoMemory { .. } => None,
+        _ => return Err(error),
+    };
+    if let Some(smallest) = smallest
         && let Ok(built) = build(method, smallest)
     {
         notes.push(format!("voxels are {smallest} units wide, not a 128th of the scene: {error}"));
@@ -269,4 +273,22 @@ pub fn default_voxel_size(bounds: &Bounds) -> f64 {
     let extent = bounds.extent().max_element();
     // A scene of one point has no extent; any size covers it with one voxel.
     if extent > 0.0 { extent / 128.0 } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As where memory is limited: there is a picture, and a note.
+    #[test]
+    fn a_default_that_does_not_fit_the_memory_is_no_error() {
+        let build = |method: Method, size| match method {
+            Method::NONE => Ok((Provers::none(), BuildReport::default())),
+            _ => Err(VisibilityError::NoMemory { size, bytes: 1 << 40 }),
+        };
+        let mut notes = Vec::new();
+        let (method, _) = build_by_default(Method::default(), 0.5, build, &mut notes).expect("it is rendered");
+        assert_eq!(method, Method::NONE);
+        assert!(notes[0].starts_with("rendered without a method: a voxel size of 0.5 needs"), "{notes:?}");
+    }
 }

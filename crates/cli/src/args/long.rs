@@ -40,7 +40,7 @@ pub(crate) struct LongArgs {
     /// Only these frames of the sequence
     #[arg(long, value_name = "N|FIRST-LAST", value_parser = parse_frames, requires = "sequence")]
     pub(crate) frames: Option<FrameRange>,
-    /// Pass over what has been rendered: the output is there
+    /// Pass over what has been rendered: all its files are there
     #[arg(long)]
     pub(crate) skip_existing: bool,
     /// Show the picture after each pass in tev or whoever speaks its protocol, tev's own port being 14158; the render goes on if the viewer goes away

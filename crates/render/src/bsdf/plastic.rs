@@ -62,7 +62,7 @@ impl Coat {
             return Self { eta, inside: fresnel::diffuse_reflectance(1.0 / eta), coat_share, rough: None };
         };
         let alpha = prepared.mean_luminance(&roughness.alpha_u).max(super::material::LEAST_ALPHA);
-        let rough = prepared.rough_coat(&Facets { kind: roughness.distribution, alpha: [alpha; 2] }, eta);
+        let rough = prepared.rough_coat(roughness.distribution, alpha, eta);
         Self { eta, inside: rough.inside, coat_share, rough: Some(rough) }
     }
 

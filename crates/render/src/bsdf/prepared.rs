@@ -2,9 +2,9 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use vdf_scene::{Pixels, Rgb, Texture, luminance};
+use vdf_scene::{Microfacets, Pixels, Rgb, Texture, luminance};
 
-use super::plastic::RoughCoat;
+use super::{microfacet::Facets, plastic::RoughCoat};
 
 /// Prepared so far, for one scene: pictures are known by their addresses, so they must live as long.
 #[derive(Default)]
@@ -29,34 +29,33 @@ impl Prepared {
         if base + coat > 0.0 { coat / (base + coat) } else { 0.5 }
     }
 
-    /// The coat with these facets and this relative index of refraction.
-    pub(super) fn rough_coat(&mut self, facets: &super::microfacet::Facets, eta: f64) -> Arc<RoughCoat> {
-        let key = (facets.kind as u8, facets.alpha[0].to_bits(), eta.to_bits());
-        Arc::clone(self.coats.entry(key).or_insert_with(|| Arc::new(RoughCoat::new(facets, eta))))
+    /// The coat that is as rough as this in all directions, with this relative index of refraction.
+    pub(super) fn rough_coat(&mut self, kind: Microfacets, alpha: f64, eta: f64) -> Arc<RoughCoat> {
+        let key = (kind as u8, alpha.to_bits(), eta.to_bits());
+        let new = || Arc::new(RoughCoat::new(&Facets { kind, alpha: [alpha; 2] }, eta));
+        Arc::clone(self.coats.entry(key).or_insert_with(new))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use vdf_scene::{Microfacets, TextureFilter, UvTransform, Wrap};
+    use vdf_scene::{TextureFilter, UvTransform, Wrap};
 
     use super::*;
-    use crate::bsdf::microfacet::Facets;
 
     /// What differs is not shared, and what is the same is.
     #[test]
     fn coats_and_means_are_those_asked_for() {
         let mut prepared = Prepared::default();
-        let facets = |kind, alpha| Facets { kind, alpha: [alpha; 2] };
         let asked = [
             (Microfacets::Ggx, 0.1, 1.5),
             (Microfacets::Beckmann, 0.1, 1.5),
             (Microfacets::Ggx, 0.2, 1.5),
             (Microfacets::Ggx, 0.1, 1.3),
         ];
-        let coats = asked.map(|(kind, alpha, eta)| prepared.rough_coat(&facets(kind, alpha), eta));
+        let coats = asked.map(|(kind, alpha, eta)| prepared.rough_coat(kind, alpha, eta));
         for (i, &(kind, alpha, eta)) in asked.iter().enumerate() {
-            let again = prepared.rough_coat(&facets(kind, alpha), eta);
+            let again = prepared.rough_coat(kind, alpha, eta);
             assert!((0..asked.len()).all(|j| Arc::ptr_eq(&again, &coats[j]) == (i == j)), "{i}");
         }
         let bitmap = |value| Texture::Bitmap {

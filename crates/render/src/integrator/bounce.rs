@@ -255,7 +255,43 @@ fn by_chance(worth: f32, little: f32, u: f64) -> Option<f32> {
 
 #[cfg(test)]
 mod tests {
+    use pulp::Arch;
+    use vdf_scene::{LoadOptions, Scene};
+
     use super::*;
+    use crate::{
+        Estimator, PrepareOptions, PreparedScene, Quiet, Roulette, SamplerKind, TransmittanceEstimator,
+        integrator::Connected,
+    };
+
+    /// As many numbers are passed over as are drawn, from a point and from an area, whatever becomes of the light path.
+    #[test]
+    fn paths_without_light_paths_may_have_the_same_numbers() {
+        for (name, numbers) in [("cbox_vol2", 3), ("cbox_light", 5)] {
+            let source = vdf_scenes::builtin(name).expect("a built-in scene");
+            let scene = Scene::from_source(&source, &LoadOptions::default()).expect("it loads");
+            let prepared = PreparedScene::new(scene, &PrepareOptions::default(), &Quiet).expect("it is prepared");
+            let tracer = Tracer {
+                light_paths: Connected::Always,
+                world: prepared.world(),
+                visibility: prepared.visibility(),
+                settings: prepared.scene().integrator,
+                transmittance: TransmittanceEstimator::Analytic,
+                roulette: Roulette::default(),
+                estimator: Estimator::Equiangular,
+                arch: Arch::new(),
+                progress: &Quiet,
+            };
+            assert_eq!(tracer.numbers_of_bounce(), numbers);
+            for i in 0..200 {
+                let mut drawn = Sampler::of_kind(SamplerKind::Sobol, 1, i, 0, i);
+                let mut passed = drawn.clone();
+                tracer.draw_bounce(&mut drawn, &mut Counters::default());
+                passed.skip(tracer.numbers_of_bounce());
+                assert_eq!(drawn.next_1d(), passed.next_1d(), "{name}");
+            }
+        }
+    }
 
     /// By evenly spaced numbers, for which the mean is exact but for one of them.
     #[test]
