@@ -4,7 +4,7 @@
 //! in a scene without them that costs one comparison. What of light passes a veil is a factor of what arrives.
 
 use glam::DVec3;
-use vdf_geometry::{Bounds, Bvh, CurvedHit, CurvedSet, Hit, Segment, Triangle};
+use vdf_geometry::{Bounds, Bvh, CurvedSet, Hit, Segment, Triangle};
 use vdf_scene::{Rgb, Scene};
 
 /// The shapes of a scene beside its opaque triangles.
@@ -42,15 +42,6 @@ pub(crate) enum Met {
     Veil(Hit, Triangle, TrianglePlace),
     /// A curved shape of the surface with this number, at this parameter.
     Curved(u32, f64),
-}
-
-impl Met {
-    fn t(&self) -> f64 {
-        match self {
-            Self::Triangle(hit) | Self::Veil(hit, ..) => hit.t,
-            Self::Curved(_, t) => *t,
-        }
-    }
 }
 
 impl OtherShapes {
@@ -104,18 +95,31 @@ impl OtherShapes {
 
     /// What the closed segment meets first, of these shapes and the first opaque triangle.
     pub(crate) fn first(&self, segment: &Segment, opaque: Option<Hit>) -> Option<Met> {
-        let veil = |hit: Hit| {
+        let mut first = opaque.map(Met::Triangle);
+        let mut before = opaque.map_or(f64::INFINITY, |hit| hit.t);
+        if let Some(hit) = self.curved.intersect(segment, before)
+            && hit.t < before
+        {
+            before = hit.t;
+            first = Some(Met::Curved(self.curved_surfaces[hit.shape as usize], hit.t));
+        }
+        let veils = &self.veils;
+        if veils.triangles.is_empty() && veils.curved.is_empty() {
+            return first;
+        }
+        if let Some(hit) = veils.bvh.intersect(segment)
+            && hit.t < before
+        {
+            before = hit.t;
             let i = hit.triangle as usize;
-            Met::Veil(hit, self.veils.triangles[i], self.veils.places[i])
-        };
-        let curved = |surfaces: &[u32], hit: CurvedHit| Met::Curved(surfaces[hit.shape as usize], hit.t);
-        let candidates = [
-            opaque.map(Met::Triangle),
-            self.curved.intersect(segment).map(|hit| curved(&self.curved_surfaces, hit)),
-            self.veils.bvh.intersect(segment).map(veil),
-            self.veils.curved.intersect(segment).map(|hit| curved(&self.veils.curved_surfaces, hit)),
-        ];
-        candidates.into_iter().flatten().min_by(|a, b| a.t().total_cmp(&b.t()))
+            first = Some(Met::Veil(hit, veils.triangles[i], veils.places[i]));
+        }
+        if let Some(hit) = veils.curved.intersect(segment, before)
+            && hit.t < before
+        {
+            first = Some(Met::Curved(veils.curved_surfaces[hit.shape as usize], hit.t));
+        }
+        first
     }
 
     /// Whether an opaque one of these shapes meets the closed segment.
@@ -126,6 +130,9 @@ impl OtherShapes {
     /// What of light passes all veils on the closed segment; `passes` says it for each place that is met.
     pub(crate) fn pass(&self, segment: &Segment, mut passes: impl FnMut(Met) -> Rgb) -> Rgb {
         let mut product = Rgb::ONE;
+        if self.veils.triangles.is_empty() && self.veils.curved.is_empty() {
+            return product;
+        }
         self.veils.bvh.visit_hits(segment, |hit| {
             let i = hit.triangle as usize;
             product *= passes(Met::Veil(hit, self.veils.triangles[i], self.veils.places[i]));

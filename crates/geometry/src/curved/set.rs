@@ -2,7 +2,7 @@
 //!
 //! *Guarantee.* The hierarchy only culls: its boxes are double precision and wider than the shapes, and a segment misses a box only by a comparison of
 //! exact numbers, or by more than the rounding of the slab test. The first of several hits is that with the least (t, number), which is a function of
-//! segment and shapes alone.
+//! segment and shapes alone; shapes beyond a given place are left out if their boxes, widened by more than hits are rounded by, are beyond it.
 
 use glam::DVec3;
 use smallvec::{SmallVec, smallvec};
@@ -97,32 +97,35 @@ impl CurvedSet {
     /// Whether any shape meets the closed segment, exactly.
     #[must_use]
     pub fn occluded(&self, segment: &Segment) -> bool {
-        self.any(segment, |_, shape| shape.meets(segment))
+        self.any(segment, f64::INFINITY, |_, shape| shape.meets(segment))
     }
 
-    /// The first shape that the closed segment meets.
+    /// The first shape that the closed segment meets. One that is met beyond the parameter `before` only may be left out.
     #[must_use]
-    pub fn intersect(&self, segment: &Segment) -> Option<CurvedHit> {
+    pub fn intersect(&self, segment: &Segment, before: f64) -> Option<CurvedHit> {
         let mut best: Option<CurvedHit> = None;
-        self.visit_hits(segment, |hit| {
-            if best.is_none_or(|b| (hit.t, hit.shape) < (b.t, b.shape)) {
-                best = Some(hit);
+        self.any(segment, before, |shape, curved| {
+            for t in curved.hits(segment).into_iter().flatten() {
+                if best.is_none_or(|b| (t, shape) < (b.t, b.shape)) {
+                    best = Some(CurvedHit { shape, t });
+                }
             }
+            false
         });
         best
     }
 
     /// Calls `visit` with each place at which the closed segment meets a shape, in no particular order.
     pub fn visit_hits(&self, segment: &Segment, mut visit: impl FnMut(CurvedHit)) {
-        self.any(segment, |number, shape| {
+        self.any(segment, f64::INFINITY, |number, shape| {
             shape.hits(segment).into_iter().flatten().for_each(|t| visit(CurvedHit { shape: number, t }));
             false
         });
     }
 
-    /// Whether `found` holds for a shape whose box the segment may meet; asked until it does.
+    /// Whether `found` holds for a shape whose box the segment may meet up to the parameter `before`; asked until it does.
     #[inline]
-    fn any(&self, segment: &Segment, mut found: impl FnMut(u32, &CurvedShape) -> bool) -> bool {
+    fn any(&self, segment: &Segment, before: f64, mut found: impl FnMut(u32, &CurvedShape) -> bool) -> bool {
         if self.nodes.is_empty() || self.bounds.misses(segment) {
             return false;
         }
@@ -131,7 +134,7 @@ impl CurvedSet {
         let mut waiting: SmallVec<[u32; 32]> = smallvec![0];
         while let Some(node) = waiting.pop() {
             let node = &self.nodes[node as usize];
-            if node.bounds.misses(segment) || passes_by(&node.bounds, segment.p, inverse, size) {
+            if node.bounds.misses(segment) || passes_by(&node.bounds, segment.p, inverse, size, before) {
                 continue;
             }
             if node.count == 0 {
@@ -149,13 +152,17 @@ impl CurvedSet {
     }
 }
 
-/// True only if the line misses the box. The slab test (b − p)/d errs by three roundings of a parameter; widening the box by 2⁻⁴⁵ of the largest
-/// coordinate moves each plane by 64 of them or more.
-fn passes_by(bounds: &Bounds, p: DVec3, inverse: DVec3, size: f64) -> bool {
+/// True only if the line misses the box, or enters it beyond the parameter `before`. The slab test (b − p)/d errs by three roundings of a parameter; widening the box by 2⁻⁴⁵ of the
+/// largest coordinate moves each plane by 64 of them or more. It is widened by a thousandth of its size as well, for where a line touches a shape the place of the hit may be off by
+/// the root of the rounding.
+fn passes_by(bounds: &Bounds, p: DVec3, inverse: DVec3, size: f64, before: f64) -> bool {
     let pad = (size + bounds.largest_coordinate()) * (1.0 / 35_184_372_088_832.0);
+    let pad = pad + bounds.extent().max_element() * (1.0 / 1024.0);
     let (t0, t1) = ((bounds.min - pad - p) * inverse, (bounds.max + pad - p) * inverse);
     // A direction parallel to a slab gives infinities of two signs if the start is between its planes, and NaN on one: those decide nothing.
     let near = t0.min(t1);
     let far = t0.max(t1);
-    near.max_element() > far.min_element() && near.is_nan_mask().bitmask() == 0 && far.is_nan_mask().bitmask() == 0
+    near.max_element() > far.min_element().min(before)
+        && near.is_nan_mask().bitmask() == 0
+        && far.is_nan_mask().bitmask() == 0
 }

@@ -50,6 +50,7 @@ fn a_touch_is_a_hit_and_an_ulp_beside_is_none() {
 fn the_filter_agrees_with_exact_arithmetic() {
     let mut random = fastrand::Rng::with_seed(7);
     let mut close = 0;
+    let (mut clear, mut doubtful) = (0, 0);
     for round in 0..4_320 {
         let kind = [CurvedKind::Sphere, CurvedKind::Disk, CurvedKind::Cylinder][round % 3];
         let mut number = |size: f64| size * (2.0 * random.f64() - 1.0);
@@ -88,6 +89,23 @@ fn the_filter_agrees_with_exact_arithmetic() {
         assert_eq!(shape.meets(&segment), exact, "{round}");
         let reversed = Segment::new(segment.q, segment.p);
         assert_eq!(shape.meets(&reversed), exact, "{round}");
+        if kind == CurvedKind::Sphere {
+            for p in [segment.p, segment.q] {
+                assert_eq!(Some(shape.side(p)), shape.side_with::<Expansion>(p), "{round} {p}");
+            }
+            // Where ends and nearest point are clear: near the surface by multiples of what counts as close.
+            let error = shape.distance_error(segment.p.abs().max(segment.q.abs()).max_element());
+            for by in [-3.0, -1.1, -0.9, 0.9, 1.1, 3.0] {
+                let moved = normal * (by * error);
+                let s = Segment::new(shape.to_world(p + moved), shape.to_world(q + moved));
+                let exact = shape.meets_with::<Expansion>(&s).expect("exact");
+                match shape.meets_clearly(&s) {
+                    Some(answer) => clear += usize::from(answer == exact),
+                    None => doubtful += 1,
+                }
+                assert!(shape.meets_clearly(&s).is_none_or(|answer| answer == exact), "{round} {by} {s:?}");
+            }
+        }
         for t in shape.hits(&segment).into_iter().flatten() {
             let local = shape.to_local(segment.at(t));
             let off = local.distance(shape.snapped(local));
@@ -97,6 +115,7 @@ fn the_filter_agrees_with_exact_arithmetic() {
         }
     }
     assert!(close > 400, "the test is about close calls: {close}");
+    assert!(clear > 5000 && doubtful > 1000, "{clear} clear, {doubtful} doubtful");
 }
 
 /// The first hit by the hierarchy is the first by a loop.
@@ -124,12 +143,18 @@ fn the_set_only_culls() {
         let by_loop =
             (0..).zip(&shapes).flat_map(|(n, shape)| shape.hits(&s).into_iter().flatten().map(move |t| (t, n)));
         let first = by_loop.min_by(|a, b| a.partial_cmp(b).expect("numbers"));
-        assert_eq!(set.intersect(&s).map(|hit| (hit.t, hit.shape)), first, "{s:?}");
+        assert_eq!(set.intersect(&s, f64::INFINITY).map(|hit| (hit.t, hit.shape)), first, "{s:?}");
+        // What is met beyond a place may be left out, and nothing else.
+        let t = first.map_or(0.5, |(t, _)| t);
+        for before in [t, t.next_down(), t.next_up(), 0.5 * t, 2.0 * t] {
+            let hit = set.intersect(&s, before).map(|hit| (hit.t, hit.shape));
+            assert_eq!(hit.filter(|hit| hit.0 <= before), first.filter(|hit| hit.0 <= before), "{s:?}, {before}");
+        }
         assert_eq!(set.occluded(&s), first.is_some());
         hits += usize::from(first.is_some());
     }
     assert!(hits > 300, "{hits}");
-    assert!(CurvedSet::new(vec![]).intersect(&Segment::new(DVec3::ZERO, DVec3::ONE)).is_none());
+    assert!(CurvedSet::new(vec![]).intersect(&Segment::new(DVec3::ZERO, DVec3::ONE), f64::INFINITY).is_none());
 }
 
 #[test]

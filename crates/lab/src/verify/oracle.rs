@@ -68,7 +68,7 @@ impl<'a> Oracle<'a> {
         let every = self.every_curved * if at_curved { 1 } else { UNCURVED };
         let curved = self.world.curved().filter(|_| index.is_multiple_of(every)).map(|curved| {
             let by_loop = curved.shapes().iter().any(|shape| shape.meets_exactly(segment));
-            [curved.occluded(segment), curved.intersect(segment).is_some(), by_loop]
+            [curved.occluded(segment), curved.intersect(segment, f64::INFINITY).is_some(), by_loop]
         });
         Truth { by_hierarchy, by_loop, curved }
     }

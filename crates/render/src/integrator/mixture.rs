@@ -62,6 +62,8 @@ impl<R: Recorder> Tracer<'_, R> {
             let event = match towards.filter(near) {
                 _ if is_last => self.arrival(&mut path, counters),
                 Some(light) => self.event_near_light(&mut path, &light, u, counters),
+                // Nothing depends on it where nothing is.
+                None if media.are_nowhere() => self.first_event(&mut path, f64::INFINITY, counters),
                 None => self.first_event(&mut path, -(-u).ln_1p(), counters),
             };
             let (vertex, point, regions) = match event {

@@ -437,6 +437,9 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline]
     fn transmittance_to(&self, point: DVec3, light: &LightSample, regions: &RegionSet, flight: Option<f64>) -> Rgb {
         let (media, segment) = (&self.world.media, Segment::new(point, light.point));
+        if media.are_nowhere() {
+            return Rgb::ONE;
+        }
         let through = |tau: f64| match flight {
             None => to_f32((-tau).exp()),
             Some(flight) => f32::from(flight >= tau),

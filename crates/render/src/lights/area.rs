@@ -20,6 +20,8 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct AreaLight {
     triangles: Vec<Triangle>,
+    /// The unit normal of each, and how far a ray to it ends from it.
+    faces: Vec<(DVec3, f64)>,
     /// In place of triangles.
     curved: Option<Box<CurvedShape>>,
     /// Running sum of the triangles' areas.
@@ -85,6 +87,7 @@ impl AreaLight {
             }
         };
         let triangles: Vec<Triangle> = numbered.into_iter().map(|(_, triangle)| triangle).collect();
+        let faces = triangles.iter().map(|t| (t.area_normal().normalize(), lift(t))).collect();
         let cumulative_area = triangles
             .iter()
             .scan(0.0, |sum, t| {
@@ -97,7 +100,7 @@ impl AreaLight {
             let (linear, centre) = c.placement();
             Ball { centre, radius: linear.determinant().abs().cbrt() }
         });
-        Self { triangles, curved: curved.map(Box::new), cumulative_area, radiance, ball }
+        Self { triangles, faces, curved: curved.map(Box::new), cumulative_area, radiance, ball }
     }
 
     /// The light, if it is a ball.
@@ -134,8 +137,8 @@ impl AreaLight {
                 Radiance::Constant(radiance) => *radiance,
                 Radiance::Texture { texture, attributes, numbers } => glow(texture, attributes, numbers[i], [wb, wc]),
             };
-            let triangle = &self.triangles[i];
-            AreaPoint { point, normal: triangle.area_normal().normalize(), lift: lift(triangle), radiance }
+            let (normal, lift) = self.faces[i];
+            AreaPoint { point, normal, lift, radiance }
         })
     }
 

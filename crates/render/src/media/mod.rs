@@ -162,6 +162,9 @@ impl Media {
     #[inline]
     #[must_use]
     pub fn at_end(&self, segment: &Segment, start: &RegionSet) -> RegionSet {
+        if self.are_nowhere() {
+            return start.clone();
+        }
         self.regions.at_end(segment, start)
     }
 
@@ -173,6 +176,13 @@ impl Media {
             Some(Substance::Heterogeneous(m)) => m.bounds().unwrap_or(Bounds::EMPTY),
             _ => Bounds::EMPTY,
         }
+    }
+
+    /// Whether there is no boundary and no medium outside: nothing is anywhere.
+    #[inline]
+    #[must_use]
+    pub(crate) fn are_nowhere(&self) -> bool {
+        self.regions.are_none()
     }
 
     /// True if the segment crosses no boundary of a medium.
@@ -206,6 +216,9 @@ impl Media {
     #[inline]
     #[must_use]
     pub fn optical_depth(&self, segment: &Segment, start: &RegionSet) -> f64 {
+        if self.are_nowhere() {
+            return 0.0;
+        }
         let length = segment.length();
         let mut tau = 0.0;
         let _ = self.regions.walk(segment, start, |i, _| {
@@ -220,6 +233,9 @@ impl Media {
     #[inline]
     #[must_use]
     pub fn free_flight(&self, segment: &Segment, start: &RegionSet, tau: f64) -> FreeFlight {
+        if self.are_nowhere() {
+            return FreeFlight::Passed(start.clone());
+        }
         let length = segment.length();
         let mut left = DepthLeft { tau };
         let spend = |i: MediumInterval, regions: &RegionSet| match left.spend(self, &i, segment, length) {

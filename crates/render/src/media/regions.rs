@@ -130,6 +130,12 @@ impl Regions {
         regions.innermost().map_or(self.ambient, |region| self.inner[region as usize])
     }
 
+    /// Whether there are no regions and no medium outside.
+    #[inline]
+    pub(super) fn are_none(&self) -> bool {
+        self.extents.is_empty() && self.ambient.is_none()
+    }
+
     /// The medium that the outermost of these regions has outside, by its boundary.
     pub(super) fn around(&self, regions: &RegionSet) -> Option<MediumId> {
         regions.outermost().and_then(|region| self.outer[region as usize])
