@@ -242,7 +242,10 @@ fn light_samples(n: u32, salt: u32) -> impl Iterator<Item = vdf::render::LightSa
 #[test]
 fn emitters_and_the_sky_are_drawn_evenly() {
     let lights = Lights::new(&lit(), REACH);
-    assert!((lights.pdf_background(DVec3::X) * 4.0 * PI * 5.0 - 1.0).abs() < 1e-15, "the density integrates to 1/5");
+    assert!(
+        (lights.pdf_background(DVec3::X, 5.0) * 4.0 * PI * 5.0 - 1.0).abs() < 1e-15,
+        "the density integrates to 1/5"
+    );
     let mut emitters = [0; 5];
     let mut sky = [0; 128];
     for s in light_samples(300_000, 0) {
@@ -250,7 +253,7 @@ fn emitters_and_the_sky_are_drawn_evenly() {
         assert!(s.direction.is_normalized());
         match s.emitter {
             2 => {
-                assert!(s.pdf == lights.pdf_background(s.direction) && !s.on_surface);
+                assert!(s.pdf == lights.pdf_background(s.direction, 5.0) && !s.on_surface);
                 assert!((s.point - FROM - s.direction * REACH).length() < 1e-9 * REACH);
                 assert!((f64::from(s.weight.x) * s.pdf / 0.5 - 1.0).abs() < 1e-6);
                 let azimuth = (s.direction.x.atan2(s.direction.z) / TAU + 1.0).fract();
@@ -327,7 +330,7 @@ fn area_emitters_fill_their_solid_angle() {
         let (mut n, mut sum, mut sum2) = (0.0, 0.0, 0.0);
         for s in light_samples(300_000, 2).filter(|s| s.emitter == emitter) {
             let distance = s.point.distance(FROM);
-            let pdf = lights.pdf_area(emitter, distance, -s.direction.z);
+            let pdf = lights.pdf_area(emitter, distance, -s.direction.z, 5.0);
             // The sampled point is lifted by 2⁻³² of its triangle's largest coordinate, here at most 4; the distance is at least 1 and squared.
             assert!((pdf / s.pdf - 1.0).abs() < 8.0 / 4_294_967_296.0, "{pdf} {}", s.pdf);
             assert!((f64::from(s.weight.x) * s.pdf / radiance - 1.0).abs() < 1e-6);

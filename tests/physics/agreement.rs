@@ -4,7 +4,7 @@
 use glam::{dvec3, vec3};
 use vdf::{
     geometry::Triangle,
-    render::{Estimator, Integrator, SamplerKind, SegmentSamples},
+    render::{Estimator, Integrator, LightPaths, SamplerKind, SegmentSamples},
     scene::{Bsdf, Emitter, IntegratorSettings, Phase, Rgb, Scene, Surface},
 };
 
@@ -151,6 +151,49 @@ fn lit_parts_of_rays_agree_with_queries() {
                 error < enough * level,
                 "{samples} samples, {sampler:?}, part {part}: too noisy, {error} of {level}"
             );
+        }
+    }
+}
+
+/// Thirty lamps, some of them strong, beside an area light and a sky: whether emitters are drawn alike, as `thesis` does, or by what they can give, with and without light paths,
+/// and for samples on rays, the mean is one, over the image and over each quarter of it: 5 standard errors are a false alarm of 6·10⁻⁷ each.
+#[test]
+fn lamps_may_be_asked_by_what_they_give() {
+    let settings = IntegratorSettings { max_depth: Some(4), rr_depth: 3 };
+    let mut scene = Scene { integrator: settings, ..scene(0.6, 0.9, 1.0) };
+    for i in 0..30 {
+        let [x, y, z] = [0.7, 0.31, 0.83].map(|step| (step * f64::from(i) + 0.2).fract() - 0.5);
+        let intensity = Rgb::splat([0.05, 0.01, 0.2][i as usize % 3]);
+        // Above the fogs, or the variance is infinite.
+        let position = dvec3(4.0 * x, 2.2 + y, 3.0 + 5.0 * z);
+        scene.emitters.push(Emitter::Point { position, intensity });
+    }
+    for integrator in [Integrator::Volpath, Integrator::raymarch(3)] {
+        let image = |estimator, light_paths, spp, seed| {
+            let o = Options { integrator, estimator, light_paths, spp: Some(spp), seed: Some(seed), ..options() };
+            rendered(&scene, &o).image.pixels
+        };
+        let thesis = image(Estimator::Thesis, LightPaths::Never, 1024, 1);
+        let level = thesis.iter().map(|p| f64::from(p.x)).sum::<f64>() / thesis.len() as f64;
+        for light_paths in [LightPaths::Never, LightPaths::Always] {
+            if light_paths == LightPaths::Always && integrator != Integrator::Volpath {
+                continue;
+            }
+            let other = image(Estimator::Equiangular, light_paths, 256, 2);
+            for part in 0..5 {
+                let kept =
+                    thesis.iter().zip(&other).enumerate().filter(|(i, _)| part == 4 || i * 4 / thesis.len() == part);
+                let differences: Vec<f64> = kept.map(|(_, (a, b))| f64::from(a.x - b.x)).collect();
+                let n = differences.len() as f64;
+                let mean = differences.iter().sum::<f64>() / n;
+                let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+                println!("{integrator:?}, {light_paths:?}, part {part}: {:.1e} ± {:.1e}", mean / level, error / level);
+                assert!(mean.abs() < 5.0 * error, "{integrator:?}, {light_paths:?}, part {part}: {mean} ± {error}");
+                assert!(
+                    error < 2.5e-2 * level,
+                    "{integrator:?}, {light_paths:?}, part {part}: too noisy, {error} of {level}"
+                );
+            }
         }
     }
 }

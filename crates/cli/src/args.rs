@@ -60,8 +60,8 @@ pub(crate) struct RenderArgs {
     /// The EXR to write; a PNG is written beside it [default: the scene's name in the current folder]
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
-    /// Acceleration of visibility queries; the image is the same with all. "auto" follows some paths first and takes what renders this many samples soonest [default: lb,
-    /// amr-xsn beyond 10,000 triangles or 256 lights, or none in a scene without point and area lights and without --segment-first]
+    /// Acceleration of visibility queries; the image is the same with all. "auto" follows some paths first, a hundredth of the render, and takes what renders this many
+    /// samples soonest: no method, xsn or lb [default: auto, or amr-xsn with --segment-first]
     #[arg(long, value_name = "METHOD", value_parser = method_choice_parser())]
     pub(crate) method: Option<MethodChoice>,
     /// Texels along each side of a face of a light buffer (method lb), rounded up to a power of two [default: auto, about

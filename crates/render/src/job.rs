@@ -175,7 +175,8 @@ impl std::fmt::Debug for PathTracer<'_> {
 impl PathTracer<'_> {
     /// The random numbers of a sample.
     fn numbers(&self, x: u32, y: u32, sample: u32) -> Sampler {
-        Sampler::of_kind(self.sampler, self.seed, x, y, sample).even_up_to(self.integrator.even_dimensions())
+        let even = self.integrator.even_dimensions(self.tracer.world.lights.count());
+        Sampler::of_kind(self.sampler, self.seed, x, y, sample).even_up_to(even)
     }
 
     /// What the camera ray of a sample meets first.

@@ -80,7 +80,7 @@ pub(crate) fn pay(scene: &Scene, world: &World) -> bool {
                 for sample in 0..SAMPLES {
                     let ray = tracer.camera_ray(camera.position(), &camera.ray(x, y, world.lights.reach()));
                     let sampler = Sampler::of_kind(SamplerKind::Sobol, seed, column, row, sample);
-                    let mut sampler = sampler.even_up_to(Integrator::Volpath.even_dimensions());
+                    let mut sampler = sampler.even_up_to(Integrator::Volpath.even_dimensions(world.lights.count()));
                     // The place in the pixel.
                     sampler.skip(2);
                     let radiance = tracer.volpath_by_mixture(ray, &mut sampler, counters);

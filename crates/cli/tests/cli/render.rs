@@ -56,10 +56,16 @@ fn an_exr_has_the_checksum_of_its_scene() {
 #[test]
 fn method_by_default() {
     let sandbox = Sandbox::new();
-    for scene in ["cbox_vol2", "cbox_light"] {
-        let text = sandbox.render(&[scene, "-o", "fog.exr"]).stdout;
-        assert!(text.contains("method         lb"), "{text}");
+    let text = |options: &[&str]| sandbox.render(&[&["-o", "fog.exr"], options].concat());
+    // A pilot chooses, and only the statistics tell.
+    for scene in ["cbox_vol2", "cbox_light", "scape"] {
+        let outcome = text(&[scene]);
+        assert!(outcome.stdout.contains("\nchosen         "), "{}", outcome.stdout);
+        assert!(!outcome.stderr.contains("note: method"), "{}", outcome.stderr);
     }
+    let outcome = text(&["cbox_light", "--segment-first"]);
+    assert!(outcome.stdout.contains("method         amr-xsn\n"), "{}", outcome.stdout);
+    assert!(!outcome.stdout.contains("\nchosen "), "{}", outcome.stdout);
 }
 
 /// A pilot says what it chose and why, in the statistics and beside them; the picture is that of any method.

@@ -21,12 +21,8 @@ use vdf_geometry::Segment;
 use vdf_scene::{Phase, Rgb};
 use vdf_visibility::{Counters, QueryKind, Recorder, ShadowQuery};
 
-use super::{Origin, Path, Tracer, Vertex, choose, to_f32, volpath::Event};
-use crate::{
-    LightSample, PhaseFunction as _, RegionSet, Sampler,
-    lights::{Beam, LightRay},
-    world::SurfacePoint,
-};
+use super::{Origin, Path, Tracer, Vertex, to_f32, volpath::Event};
+use crate::{LightSample, PhaseFunction as _, RegionSet, Sampler, lights::LightRay, world::SurfacePoint};
 
 /// A connection that brings less than this share of the light that the path has gathered is made as seldom as it brings less, and is then worth as much more.
 const LITTLE: f32 = 0.05;
@@ -77,7 +73,7 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline(never)]
     fn draw_bounce(&self, sampler: &mut Sampler, counters: &mut Counters) -> Option<Bounce> {
         let lights = &self.world.lights;
-        let (i, u) = choose(sampler.next_1d(), lights.beams().len())?;
+        let (i, u) = lights.choose_beam(sampler.next_1d())?;
         let beam = &lights.beams()[i];
         let of_place = if lights.numbers_of_origin() > 0 { sampler.next_2d() } else { [0.0; 2] };
         let from_light = beam.sample(lights, [of_place, sampler.next_2d()])?;
@@ -99,9 +95,10 @@ impl<R: Recorder> Tracer<'_, R> {
             }
             Event::Arrival { surface: None, .. } => return None,
         };
-        let light = self.light_of_ray(beam, &from_light, point)?;
+        let choices = self.choices(beam.emitter, point);
+        let light = self.light_of_ray(i, &from_light, point, choices)?;
         let distance2 = point.distance_squared(light.point);
-        let density = lights.density_of_beam(beam.emitter, distance2, light.pdf) * cosine / distance2;
+        let density = lights.density_of_beam(beam.emitter, distance2, light.pdf, choices) * cosine / distance2;
         let kind = if light.on_surface && kind == QueryKind::Spatial { QueryKind::OnLight } else { kind };
         let query = ShadowQuery { from: point, to: light.point, emitter: beam.emitter, kind };
         let is_lit = density > 0.0 && density.is_finite() && self.visibility.unoccluded(&query, counters);
@@ -113,15 +110,18 @@ impl<R: Recorder> Tracer<'_, R> {
         3 + self.world.lights.numbers_of_origin()
     }
 
-    /// What a ray from an emitter, which starts there, brings to `point`; its weight is what is scattered at the point over the cosine there and the density of the ray.
+    /// What a ray of a beam, which starts there, brings to `point`, where its emitter is one of so many; its weight is what is scattered at the point over the cosine there and the
+    /// density of the ray.
     #[inline]
-    fn light_of_ray(&self, beam: &Beam, ray: &LightRay, point: DVec3) -> Option<LightSample> {
+    fn light_of_ray(&self, beam: usize, ray: &LightRay, point: DVec3, choices: f64) -> Option<LightSample> {
         let lights = &self.world.lights;
-        let choices = lights.beams().len() as f64;
+        let beams = 1.0 / lights.beam_chance(beam);
+        let beam = &lights.beams()[beam];
         let Some((normal, radiance)) = ray.surface else {
-            let light = lights.seen_from(point, &lights.sample_point(beam.emitter, [0.0; 2])?)?;
+            let place = lights.sample_point(beam.emitter, [0.0; 2])?.of_choices(choices);
+            let light = lights.seen_from(point, &place)?;
             let distance2 = point.distance_squared(light.point);
-            let density = lights.density_of_beam(beam.emitter, distance2, light.pdf);
+            let density = lights.density_of_beam(beam.emitter, distance2, light.pdf, choices);
             return Some(LightSample { weight: light.weight * to_f32(distance2 / density), ..light });
         };
         let d = ray.origin - point;
@@ -132,9 +132,10 @@ impl<R: Recorder> Tracer<'_, R> {
             emitter: beam.emitter,
             point: ray.origin,
             direction,
-            weight: radiance * to_f32(beam.throughput() * choices),
-            pdf: lights.pdf_area(beam.emitter, distance, cosine),
+            weight: radiance * to_f32(beam.throughput() * beams),
+            pdf: lights.pdf_area(beam.emitter, distance, cosine, choices),
             on_surface: true,
+            choices,
         })
     }
 
@@ -232,7 +233,7 @@ impl<R: Recorder> Tracer<'_, R> {
     pub(super) fn weight_beside_bounce(&self, arrival: f64, point: DVec3, vertex: &Vertex, light: &LightSample) -> f64 {
         let cosine = vertex.cosine_to(light.direction);
         let distance2 = light.point.distance_squared(point);
-        let of_direction = self.world.lights.density_of_beam(light.emitter, distance2, light.pdf);
+        let of_direction = self.world.lights.density_of_beam(light.emitter, distance2, light.pdf, light.choices);
         share_beside_bounce(arrival, of_direction * cosine / distance2)
     }
 }

@@ -330,7 +330,7 @@ mod tests {
             let light = world.lights.points()[0].1;
             let fog_bounds = world.clear.expect("one box, with all lights in it");
             for arch in [Arch::new(), Arch::Scalar] {
-                let tracer = tracer(&prepared, arch);
+                let mut tracer = tracer(&prepared, arch);
                 for i in 0..1500 {
                     let sampler = &mut Sampler::new(17, i, 0, 0);
                     let free = ray(&fog_bounds, light, sampler);
@@ -344,6 +344,8 @@ mod tests {
                     let fog = Fog { free: &free, direction, intervals: &intervals, tau, samples };
                     let parts = stretches(&intervals, &world.media);
                     for towards in [false, true] {
+                        // By transmittance is what `thesis` does.
+                        tracer.estimator = if towards { Estimator::Equiangular } else { Estimator::Thesis };
                         let [together, apart] = [true, false].map(|together| {
                             let mut fan = tracer.fan(&fog).filter(|_| together);
                             assert_eq!(fan.is_some(), together, "{name}");

@@ -98,10 +98,11 @@ impl Integrator {
     }
 
     /// So many of a path's first random numbers are worth being even: those of the pixel and of one event and a half, for path tracing, whose light
-    /// comes from many; more take time and no noise away (`docs/performance.md`).
+    /// comes from many; more take time and no noise away (`docs/performance.md`). Of several emitters one has to be chosen, too.
     #[must_use]
-    pub(crate) const fn even_dimensions(self) -> u32 {
+    pub(crate) const fn even_dimensions(self, emitters: usize) -> u32 {
         match self {
+            Self::Volpath if emitters > 1 => 16,
             Self::Volpath => 12,
             Self::Raymarch(_) => 64,
         }

@@ -22,6 +22,7 @@ use vdf_visibility::{Counters, Recorder};
 use super::{
     Origin, Path, PathRay, Tracer, Vertex,
     bounce::{Connected, LightPath},
+    choose,
     equiangular::{Equiangular, LightPlace},
     stretch::{distance_at_depth, stretches},
     to_f32,
@@ -55,10 +56,15 @@ impl<R: Recorder> Tracer<'_, R> {
                 break;
             }
             let direction = path.ray.direction;
-            let (place, u) = self.draw_place(sampler);
-            let towards = place.and_then(|place| lights.point_position(place.emitter()));
+            let u = sampler.next_1d();
+            // The only emitter's place serves the distance and the event; of several one is drawn for each, for an event knows better.
+            let origin = path.ray.segment.p;
+            let chosen = choose(u, lights.count());
+            let u = chosen.map_or(u, |(_, rest)| rest);
+            let place = if lights.count() == 1 { self.draw_place(0, sampler) } else { None };
+            let towards = chosen.and_then(|(emitter, _)| lights.point_position(emitter));
             let towards = towards.map(|position| LightPlace { position, normal: None });
-            let near = |light: &LightPlace| light.passed_at(path.ray.segment.p, direction) < near_enough;
+            let near = |light: &LightPlace| light.passed_at(origin, direction) < near_enough;
             let event = match towards.filter(near) {
                 _ if is_last => self.arrival(&mut path, counters),
                 Some(light) => self.event_near_light(&mut path, &light, u, counters),

@@ -321,23 +321,38 @@ impl<R: Recorder> Tracer<'_, R> {
         arriving.value * to_f32(weight)
     }
 
-    /// A sample of an emitter, as seen from `point`, and what [`Tracer::flight_to_emitter`] draws.
+    /// A sample of an emitter, as seen from `point`, and what [`Tracer::flight_to_emitter`] draws. Takes as many numbers whichever it is.
     #[inline]
     fn draw_emitter(&self, point: DVec3, sampler: &mut Sampler) -> (Option<LightSample>, Option<f64>) {
-        let (place, _) = self.draw_place(sampler);
-        // Drawn even if no one will ask for it: how many numbers an event takes depends on nothing.
-        let flight = self.flight_to_emitter(sampler);
-        (place.and_then(|place| self.world.lights.seen_from(point, &place)), flight)
-    }
-
-    /// A place on an emitter, each equally likely, and what is left of the number that chose the emitter: uniform. Takes as
-    /// many numbers whichever it is.
-    #[inline]
-    fn draw_place(&self, sampler: &mut Sampler) -> (Option<EmitterPoint>, f64) {
         let lights = &self.world.lights;
         let u = sampler.next_1d();
-        let chosen = if lights.count() == 1 { Some((0, u)) } else { choose(u, lights.count()) };
-        let Some((emitter, u)) = chosen else { return (None, u) };
+        let chosen = match self.estimator {
+            Estimator::Thesis => choose(u, lights.count()).map(|(emitter, _)| (emitter, lights.count() as f64)),
+            Estimator::Equiangular | Estimator::Lit => {
+                lights.choose_at(point, u).map(|drawn| (drawn.emitter, 1.0 / drawn.chance))
+            }
+        };
+        let place = chosen
+            .and_then(|(emitter, choices)| self.draw_place(emitter, sampler).map(|place| place.of_choices(choices)));
+        // Drawn even if no one will ask for it: how many numbers an event takes depends on nothing.
+        let flight = self.flight_to_emitter(sampler);
+        (place.and_then(|place| lights.seen_from(point, &place)), flight)
+    }
+
+    /// One over the probability with which an event at `point` asks this emitter.
+    #[inline]
+    fn choices(&self, emitter: usize, point: DVec3) -> f64 {
+        let lights = &self.world.lights;
+        match self.estimator {
+            Estimator::Thesis => lights.count() as f64,
+            Estimator::Equiangular | Estimator::Lit => lights.choices_at(emitter, point),
+        }
+    }
+
+    /// A place on this emitter. Takes as many numbers whichever it is.
+    #[inline]
+    fn draw_place(&self, emitter: usize, sampler: &mut Sampler) -> Option<EmitterPoint> {
+        let lights = &self.world.lights;
         let needs_numbers = lights.numbers_of_place() > 0 && lights.point_position(emitter).is_none();
         let numbers = if needs_numbers {
             sampler.next_2d()
@@ -345,7 +360,7 @@ impl<R: Recorder> Tracer<'_, R> {
             sampler.skip(lights.numbers_of_place());
             [0.0; 2]
         };
-        (lights.sample_point(emitter, numbers), u)
+        lights.sample_point(emitter, numbers)
     }
 
     /// The query that a sample of an emitter depends on, and the light that arrives if it is unoccluded; `None` if that is nothing anyway. For vertices in a medium, with
@@ -455,9 +470,10 @@ impl<R: Recorder> Tracer<'_, R> {
     #[inline]
     fn background(&self, direction: DVec3, origin: &Origin) -> Rgb {
         let radiance = self.world.lights.background(direction);
-        match origin {
-            Origin::Scattering { pdf, .. } if radiance != Rgb::ZERO => {
-                radiance * to_f32(power_heuristic(*pdf, self.world.lights.pdf_background(direction)))
+        match (origin, self.world.lights.a_far_one()) {
+            (Origin::Scattering { pdf, point, .. }, Some(emitter)) if radiance != Rgb::ZERO => {
+                let choices = self.choices(emitter, *point);
+                radiance * to_f32(power_heuristic(*pdf, self.world.lights.pdf_background(direction, choices)))
             }
             _ => radiance,
         }
@@ -470,9 +486,11 @@ impl<R: Recorder> Tracer<'_, R> {
             (Origin::Scattering { point, pdf, arrival, cosine, .. }, Some(emitter)) if surface.emitted != Rgb::ZERO => {
                 let lights = &self.world.lights;
                 let (distance, cos_theta) = (point.distance(surface.point), -direction.dot(surface.normal));
-                let (light_pdf, distance2) = (lights.pdf_area(emitter, distance, cos_theta), distance * distance);
+                let (choices, distance2) = (self.choices(emitter, *point), distance * distance);
+                let light_pdf = lights.pdf_area(emitter, distance, cos_theta, choices);
                 let weight = power_heuristic(*pdf, light_pdf);
-                let by_bounce = lights.density_of_beam(emitter, distance2, light_pdf) * cosine.max(0.0) / distance2;
+                let of_beam = lights.density_of_beam(emitter, distance2, light_pdf, choices);
+                let by_bounce = of_beam * cosine.max(0.0) / distance2;
                 surface.emitted * to_f32(weight * share_beside_bounce(*arrival, by_bounce))
             }
             _ => surface.emitted,

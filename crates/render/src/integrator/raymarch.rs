@@ -178,8 +178,14 @@ impl<R: Recorder> Tracer<'_, R> {
             }
             let u = strata.number(k, sampler);
             let flight = self.flight_to_emitter(sampler);
-            let Some((i, u)) = choose(u, emitters.len()) else { break };
-            let emitter = emitters[i];
+            // Of all by what they can give to the ray, else each alike; and what that is worth beside one of all, each alike, as its sample counts.
+            let chosen = if emitters.len() == lights.count() {
+                let drawn = lights.choose_along(fog.free.p, fog.direction, fog.intervals.length(), u);
+                drawn.map(|d| (d.emitter, d.rest, 1.0 / (d.chance * lights.count() as f64)))
+            } else {
+                choose(u, emitters.len()).map(|(i, u)| (emitters[i], u, 1.0))
+            };
+            let Some((emitter, u, beside)) = chosen else { break };
             let Some(place) = lights.sample_point(emitter, evenly(u_place, k)) else { continue };
             let towards = match lights.position(&place) {
                 None => None,
@@ -209,8 +215,9 @@ impl<R: Recorder> Tracer<'_, R> {
                 continue;
             }
             let t = (distance / fog.intervals.length()).clamp(stretch.ends[0], stretch.ends[1]);
+            let worth = to_f32(arrives / pdf * beside);
             if let Some(fan) = &mut fan {
-                if fan.push(t, emitter, to_f32(arrives / pdf)) {
+                if fan.push(t, emitter, worth) {
                     self.ask_fan(fan, fog, &mut gathered.sum, counters);
                 }
                 continue;
@@ -221,7 +228,7 @@ impl<R: Recorder> Tracer<'_, R> {
                 let regions = fog.intervals.regions_in(stretch.part, t);
                 let albedo = stretch.albedo_at(point, fog.intervals);
                 let at = Aim { point, vertex: &vertex, regions: &regions, light: &light, flight };
-                self.gather(&mut gathered, &at, |value| albedo * value * to_f32(arrives / pdf), counters);
+                self.gather(&mut gathered, &at, |value| albedo * value * worth, counters);
             }
         }
         self.ask_rest(&mut gathered, fan, fog, counters);

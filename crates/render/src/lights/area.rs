@@ -7,7 +7,7 @@ use std::{
 };
 
 use glam::{DVec3, dvec3};
-use vdf_geometry::{CurvedKind, CurvedShape, Triangle};
+use vdf_geometry::{Bounds, CurvedKind, CurvedShape, Triangle};
 use vdf_scene::{MeshAttributes, Rgb, Surface, Texture};
 
 use super::LightSample;
@@ -114,6 +114,19 @@ impl AreaLight {
         self.cumulative_area.last().copied().unwrap_or(0.0)
     }
 
+    /// Where it is.
+    pub(super) fn bounds(&self) -> Bounds {
+        self.curved.as_ref().map_or_else(|| Bounds::of_triangles(&self.triangles), |shape| *shape.bounds())
+    }
+
+    /// The mean of what it emits.
+    pub(super) fn mean_radiance(&self) -> Rgb {
+        match &self.radiance {
+            Radiance::Constant(radiance) => *radiance,
+            Radiance::Texture { texture, .. } => texture.mean(),
+        }
+    }
+
     /// A place just before the surface; `None` if there is no area.
     pub(super) fn place(&self) -> Option<DVec3> {
         Some(self.sample([0.5; 2])?.lifted())
@@ -175,6 +188,7 @@ impl AreaLight {
             weight: radiance * (1.0 / pdf) as f32,
             pdf,
             on_surface: true,
+            choices,
         })
     }
 
@@ -247,6 +261,7 @@ impl Ball {
             weight: light.radiance_on(shape, local) * (1.0 / pdf) as f32,
             pdf,
             on_surface: true,
+            choices,
         })
     }
 }

@@ -75,11 +75,11 @@ impl Beam {
         }
     }
 
-    /// What a ray carries for each unit of radiance: π times the area of a surface.
+    /// What leaves it for each unit of intensity, or of a surface's radiance: the solid angle of its cone, or π times the area.
     #[inline]
     pub(crate) fn throughput(&self) -> f64 {
         match self.directions {
-            Directions::Cone { .. } => 1.0,
+            Directions::Cone { below, .. } => TAU * below,
             Directions::Cosine { area } => PI * area,
         }
     }

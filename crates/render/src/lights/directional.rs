@@ -22,5 +22,6 @@ pub(super) fn sample(
         weight: irradiance * choices as f32,
         pdf: 0.0,
         on_surface: false,
+        choices,
     }
 }

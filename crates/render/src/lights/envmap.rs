@@ -149,6 +149,7 @@ impl EnvmapLight {
             weight: self.radiance(direction) * (1.0 / pdf) as f32,
             pdf,
             on_surface: false,
+            choices,
         })
     }
 }

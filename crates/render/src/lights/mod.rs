@@ -2,6 +2,7 @@
 
 mod area;
 mod beam;
+mod choice;
 mod constant;
 mod directional;
 mod envmap;
@@ -9,21 +10,30 @@ mod point;
 mod projector;
 mod spot;
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
+use vdf_geometry::Bounds;
 use vdf_scene::{Emitter, Rgb, Scene};
 
-pub(crate) use self::beam::{Beam, LightRay};
 use self::{
     area::{AreaLight, AreaPoint},
+    choice::{Choice, Node, Shining, along, at},
     envmap::EnvmapLight,
     projector::ProjectorLight,
     spot::SpotLight,
+};
+pub(crate) use self::{
+    beam::{Beam, LightRay},
+    choice::Drawn,
 };
 
 /// The emitters of a scene, prepared for sampling.
 #[derive(Debug)]
 pub struct Lights {
     lights: Vec<Light>,
+    /// Which of them an event asks.
+    choice: Choice,
     /// The number, position and intensity of each that is a point.
     points: Vec<(usize, DVec3, Rgb)>,
     /// The numbers of all, and of those that are no points.
@@ -39,6 +49,9 @@ pub struct Lights {
     numbers_of_place: u32,
     /// Of each that rays are sent from.
     beams: Vec<Beam>,
+    /// How likely each of these is drawn, and the sums of these up to each.
+    beam_chances: Vec<f64>,
+    beam_sums: Vec<f64>,
     numbers_of_origin: u32,
     /// By number of emitter.
     beam_of_emitter: Vec<Option<usize>>,
@@ -70,6 +83,8 @@ pub struct LightSample {
     pub pdf: f64,
     /// Whether the point lies on an occluder, so that the query is superficial (Def. 2 in \[Houska2013\]).
     pub on_surface: bool,
+    /// One over the probability with which the emitter was drawn.
+    pub choices: f64,
 }
 
 /// A place on an emitter, drawn before it is known from where it will be seen.
@@ -77,6 +92,8 @@ pub struct LightSample {
 pub(crate) struct EmitterPoint {
     emitter: usize,
     place: Place,
+    /// One over the probability of the emitter.
+    choices: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -88,10 +105,10 @@ enum Place {
 }
 
 impl EmitterPoint {
-    /// The emitter's number.
+    /// The same place of an emitter that was drawn as one of so many.
     #[inline]
-    pub(crate) const fn emitter(&self) -> usize {
-        self.emitter
+    pub(crate) const fn of_choices(self, choices: f64) -> Self {
+        Self { choices, ..self }
     }
 }
 
@@ -162,12 +179,26 @@ impl Lights {
         };
         let beams: Vec<_> = lights.iter().enumerate().filter_map(beam).collect();
         let numbers_of_origin = if beams.iter().all(Beam::is_point) { 0 } else { 2 };
+        // An even share for all, for the brightest may be shut in.
+        let powers: Vec<f64> = beams.iter().map(|b| b.throughput() * lights[b.emitter].intensity()).collect();
+        let (sum, n) = (powers.iter().sum::<f64>(), beams.len() as f64);
+        let chance = |power: &f64| if sum > 0.0 && sum.is_finite() { 0.2 / n + 0.8 * power / sum } else { 1.0 / n };
+        let beam_chances: Vec<f64> = powers.iter().map(chance).collect();
+        let beam_sums = beam_chances
+            .iter()
+            .scan(0.0, |sum, chance| {
+                *sum += chance;
+                Some(*sum)
+            })
+            .collect();
+        let choice = Choice::new(&lights.iter().map(Light::shining).collect::<Vec<_>>());
         let mut beam_of_emitter = vec![None; lights.len()];
         for (i, beam) in beams.iter().enumerate() {
             beam_of_emitter[beam.emitter] = Some(i);
         }
         Self {
             lights,
+            choice,
             points,
             all,
             others,
@@ -177,6 +208,8 @@ impl Lights {
             may_be_met,
             numbers_of_place,
             beams,
+            beam_chances,
+            beam_sums,
             numbers_of_origin,
             beam_of_emitter,
         }
@@ -226,6 +259,46 @@ impl Lights {
         &self.beams
     }
 
+    /// One of [`Lights::beams`] by its power, and what is left of the uniform number that drew it; `None` if there are none.
+    #[inline]
+    pub(crate) fn choose_beam(&self, u: f64) -> Option<(usize, f64)> {
+        let i = self.beam_sums.partition_point(|&sum| sum <= u).min(self.beams.len().checked_sub(1)?);
+        let before = if i == 0 { 0.0 } else { self.beam_sums[i - 1] };
+        Some((i, ((u - before) / self.beam_chances[i]).clamp(0.0, 1.0 - f64::EPSILON / 2.0)))
+    }
+
+    /// The probability of a beam.
+    #[inline]
+    pub(crate) fn beam_chance(&self, beam: usize) -> f64 {
+        self.beam_chances[beam]
+    }
+
+    /// An emitter that can give much to an event at `point`; `None` if there are none.
+    #[inline]
+    pub(crate) fn choose_at(&self, point: DVec3, u: f64) -> Option<Drawn> {
+        self.choose_by(u, at(point))
+    }
+
+    /// An emitter that can give much to what is scattered on so much of a ray; `None` if there are none.
+    #[inline]
+    pub(crate) fn choose_along(&self, origin: DVec3, direction: DVec3, length: f64, u: f64) -> Option<Drawn> {
+        self.choose_by(u, along(origin, direction, length))
+    }
+
+    #[inline]
+    fn choose_by(&self, u: f64, importance: impl Fn(&Node) -> f64) -> Option<Drawn> {
+        match self.lights.len() {
+            1 => Some(Drawn { emitter: 0, rest: u, chance: 1.0 }),
+            _ => self.choice.draw(u, importance),
+        }
+    }
+
+    /// One over the probability with which [`Lights::choose_at`] takes this emitter.
+    #[inline]
+    pub(crate) fn choices_at(&self, emitter: usize, point: DVec3) -> f64 {
+        if self.lights.len() == 1 { 1.0 } else { 1.0 / self.choice.chance(emitter, at(point)) }
+    }
+
     /// So many random numbers are set aside for a place to send a ray from.
     #[inline]
     pub(crate) const fn numbers_of_origin(&self) -> u32 {
@@ -241,14 +314,14 @@ impl Lights {
     }
 
     /// The density per steradian of a ray, from one of [`Lights::beams`], to a point at this squared distance, over the density with which the point's own sample of
-    /// the emitter, of density `pdf` per steradian there, starts at the same place; 0 if no ray leaves the emitter.
+    /// the emitter, one of `choices` and of density `pdf` per steradian there, starts at the same place; 0 if no ray leaves the emitter.
     #[inline]
-    pub(crate) fn density_of_beam(&self, emitter: usize, distance2: f64, pdf: f64) -> f64 {
+    pub(crate) fn density_of_beam(&self, emitter: usize, distance2: f64, pdf: f64, choices: f64) -> f64 {
         let Some(i) = self.beam_of_emitter[emitter] else { return 0.0 };
         let beam = &self.beams[i];
         // `pdf` has the choice of the emitter in it; a point has none.
-        let choices = if beam.is_point() { self.lights.len() as f64 } else { 1.0 };
-        beam.density(distance2, pdf) * choices / self.beams.len() as f64
+        let choices = if beam.is_point() { choices } else { 1.0 };
+        beam.density(distance2, pdf) * choices * self.beam_chances[i]
     }
 
     /// How many emitters there are.
@@ -275,30 +348,31 @@ impl Lights {
         &self.others
     }
 
-    /// Draws a place on an emitter. `None` if it has none.
+    /// Draws a place on an emitter, which counts as one that was drawn with the same probability as all others. `None` if it has none.
     #[inline]
     pub(crate) fn sample_point(&self, emitter: usize, u: [f64; 2]) -> Option<EmitterPoint> {
+        let choices = self.lights.len() as f64;
         if self.numbers_of_place == 0 {
-            return Some(EmitterPoint { emitter, place: Place::Point });
+            return Some(EmitterPoint { emitter, place: Place::Point, choices });
         }
         let place = match &self.lights[emitter] {
             Light::Point { .. } | Light::Spot(_) | Light::Projector(_) => Place::Point,
             Light::Area(light) if light.ball().is_none() => Place::Area(light.sample(u)?),
             Light::Area(_) | Light::Directional { .. } | Light::Constant { .. } | Light::Envmap(_) => Place::Numbers(u),
         };
-        Some(EmitterPoint { emitter, place })
+        Some(EmitterPoint { emitter, place, choices })
     }
 
-    /// The place as seen from `from`, one of as many as there are emitters. `None` if there is no light from there.
+    /// The place as seen from `from`. `None` if there is no light from there.
     #[inline]
     pub(crate) fn seen_from(&self, from: DVec3, point: &EmitterPoint) -> Option<LightSample> {
-        let (emitter, choices) = (point.emitter, self.lights.len() as f64);
+        let &EmitterPoint { emitter, choices, .. } = point;
         match (&self.lights[emitter], &point.place) {
             (Light::Point { position, intensity }, _) => point::sample(emitter, *position, *intensity, from, choices),
             (Light::Area(light), Place::Area(place)) => light.seen_from(emitter, from, place, choices),
             (Light::Area(light), Place::Numbers(u)) => light.ball()?.sample(light, emitter, from, *u, choices),
             (Light::Constant { radiance }, Place::Numbers(u)) => {
-                Some(constant::sample(emitter, from, *u, *radiance, self.pdf_constant(), self.reach))
+                Some(constant::sample(emitter, from, *u, *radiance, choices, self.reach))
             }
             (Light::Spot(light), _) => light.sample(emitter, from, choices),
             (Light::Projector(light), _) => light.sample(emitter, from, choices),
@@ -335,28 +409,29 @@ impl Lights {
         }
     }
 
-    /// The density with which [`Lights::sample`] draws this direction of the environment map, or of any one constant emitter.
+    /// The density with which this direction of the environment map, or of any one constant emitter, is drawn where an emitter is one of `choices`.
     #[inline]
     #[must_use]
-    pub fn pdf_background(&self, direction: DVec3) -> f64 {
+    pub fn pdf_background(&self, direction: DVec3, choices: f64) -> f64 {
         match self.map() {
-            None => self.pdf_constant(),
-            Some(map) => map.pdf(direction) / self.lights.len() as f64,
+            None => pdf_constant(choices),
+            Some(map) => map.pdf(direction) / choices,
         }
     }
 
+    /// An emitter that is infinitely far away, if there is one: all of them are drawn with the same probability.
     #[inline]
-    fn pdf_constant(&self) -> f64 {
-        0.25 / std::f64::consts::PI / self.lights.len() as f64
+    pub(crate) fn a_far_one(&self) -> Option<usize> {
+        self.choice.far().first().copied()
     }
 
-    /// The density with which [`Lights::sample`], from a place `distance` away, draws the point of area emitter `emitter`
-    /// that is seen under `cos_theta` to its normal.
+    /// The density with which the point of area emitter `emitter` that is seen under `cos_theta` to its normal is drawn from a place `distance` away, where the emitter is
+    /// one of `choices`.
     #[inline]
     #[must_use]
-    pub fn pdf_area(&self, emitter: usize, distance: f64, cos_theta: f64) -> f64 {
+    pub fn pdf_area(&self, emitter: usize, distance: f64, cos_theta: f64, choices: f64) -> f64 {
         match &self.lights[emitter] {
-            Light::Area(light) => light.pdf(distance, cos_theta, self.lights.len() as f64),
+            Light::Area(light) => light.pdf(distance, cos_theta, choices),
             _ => 0.0,
         }
     }
@@ -367,4 +442,38 @@ impl Lights {
     pub fn reach(&self) -> f64 {
         self.reach
     }
+}
+
+impl Light {
+    /// Where it is, and its intensity: a surface's radiance times its area.
+    fn shining(&self) -> Shining {
+        let bounds = match self {
+            Self::Point { position, .. } => Bounds::of_points([*position]),
+            Self::Spot(light) => Bounds::of_points([light.position]),
+            Self::Projector(light) => Bounds::of_points([light.position]),
+            Self::Area(light) => light.bounds(),
+            Self::Directional { .. } | Self::Constant { .. } | Self::Envmap(_) => return None,
+        };
+        let area = if let Self::Area(light) = self { light.area() } else { 1.0 };
+        Some((bounds, self.intensity() * area))
+    }
+
+    /// The mean of the colours of its intensity, or of a surface's radiance; a slide's are not looked at.
+    fn intensity(&self) -> f64 {
+        let colour = match self {
+            Self::Point { intensity, .. } => *intensity,
+            Self::Spot(light) => light.intensity,
+            Self::Projector(light) => light.slide.texture.mean() * (PI * f64::from(light.slide.scale)) as f32,
+            Self::Area(light) => light.mean_radiance(),
+            Self::Directional { .. } | Self::Constant { .. } | Self::Envmap(_) => Rgb::ZERO,
+        };
+        let intensity = f64::from(colour.element_sum()) / 3.0;
+        if intensity.is_finite() { intensity.max(0.0) } else { 0.0 }
+    }
+}
+
+/// The density of a direction of a constant emitter, one of `choices`.
+#[inline]
+fn pdf_constant(choices: f64) -> f64 {
+    0.25 / PI / choices
 }

@@ -24,5 +24,6 @@ pub(super) fn sample(
         weight: intensity * (choices / distance2) as f32,
         pdf: 0.0,
         on_surface: false,
+        choices,
     })
 }

@@ -3,13 +3,13 @@
 use serde::Serialize;
 
 /// A method that costs no more than this share of what is predicted without it is built and measured, whatever is expected of it.
-const CHEAP: f64 = 0.005;
+const CHEAP: f64 = 0.01;
 
 /// A build may cost this share of what its method is expected to save: all of it is lost where the expectation was wrong.
-const STAKE: f64 = 0.3;
+const STAKE: f64 = 0.5;
 
-/// A method has to promise to save this share of a path to be taken instead of none: less is within the noise of a pilot.
-const LEAST_GAIN: f64 = 0.02;
+/// A method has to promise to save this share of a path to be taken instead of none. What a pilot measures is off by more, but to either side, and its build is paid.
+const LEAST_GAIN: f64 = 0.005;
 
 /// The queries of one class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -50,10 +50,15 @@ impl Plain {
         self.paths.min(self.limit / self.per_path)
     }
 
+    /// Whether a build is nearly free.
+    pub(crate) fn is_cheap(&self, build: f64) -> bool {
+        build <= CHEAP * self.seconds()
+    }
+
     /// Whether to build a method, to measure it: if it is nearly free, or if what it is expected to save, `saves` seconds a path, is clearly
     /// more than `build` seconds. Does without it if a render is so short that nothing pays.
     pub(crate) fn is_worth_trying(&self, build: f64, saves: f64) -> bool {
-        build <= CHEAP * self.seconds() && saves > 0.0 || build < STAKE * saves * self.paths_rendered()
+        self.is_cheap(build) && saves > 0.0 || build < STAKE * saves * self.paths_rendered()
     }
 }
 

@@ -11,9 +11,9 @@
 //! *Guarantee.* The image is the same whatever is chosen; what is chosen may differ from run to run.
 //!
 //! *Cost.* Less than a hundredth of the predicted time of the render, at least some milliseconds and at most some hundredths of a second; and the builds that are not kept, which
-//! take at most a third of what they might have saved.
+//! take at most half of what they might have saved.
 //!
-//! *Limits.* Paths apart from each other share less of the caches than neighbours do, and one thread has them for itself. What is resumed counts as if it began anew.
+//! *Limits.* Paths apart from each other share less of the caches than neighbours do, which makes them some hundredths slower, and one thread has them for itself. What is resumed counts as if it began anew.
 
 mod choice;
 mod clock;
@@ -58,13 +58,10 @@ const SOUNDING: usize = 64;
 const ROUNDS: usize = 16;
 
 /// About so often each path is followed and its queries are asked.
-const PASSES: f64 = 6.0;
+const PASSES: f64 = 7.0;
 
 /// The fewest and the most paths of a pilot.
-const PATHS: (f64, f64) = (128.0, 8192.0);
-
-/// Samples of a pixel that are followed one after the other, as a render does.
-const SAMPLES: u32 = 4;
+const PATHS: (f64, f64) = (64.0, 8192.0);
 
 /// How much is to be rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,10 +118,12 @@ struct Trial {
 
 impl Pilot<'_> {
     fn run(&self) -> Result<(Option<PreparedScene>, Choice), RenderError> {
+        let job = self.plain.job(self.render)?;
+        // The look whether light paths pay is taken with the first tracer, and any render takes it.
+        drop(job.tracer(self.progress));
         self.progress.phase("pilot");
         let start = ThreadTime::now();
         let threads = rayon::current_num_threads();
-        let job = self.plain.job(self.render)?;
         let mut places = Places::new(&job);
         self.follow(self.plain, &places.next(WARMING))?;
         let sounding = self.follow(self.plain, &places.next(SOUNDING))? / SOUNDING as f64;
@@ -137,12 +136,19 @@ impl Pilot<'_> {
         if plain.seconds() > SHORT {
             let budget = (SHARE * plain.seconds() / threads as f64).clamp(LEAST, MOST);
             let count = (budget / (PASSES * plain.per_path)).clamp(PATHS.0, PATHS.1) as usize;
-            let seconds;
-            (recorded, seconds) = self.record(&job, &places.next(count))?;
-            followed += count;
-            plain.per_path = (sounding * SOUNDING as f64 + seconds) / (SOUNDING + count) as f64;
+            // Not by the same paths: to listen takes time, and what was followed just now is in the caches.
+            recorded = self.record(&job, &places.next(count))?;
+            plain.per_path = self.follow(self.plain, &places.next(count))? / count as f64;
+            followed += 2 * count;
             queries = self.query_costs(&recorded, count);
-            for (method, expected) in self.offers(&recorded, count, &queries) {
+            let offers = self.offers(&recorded, count, &queries);
+            // What is nearly free to build, and expected to save the most, needs no rival.
+            let most = offers.iter().map(|(_, expected)| expected.saves).fold(0.0, f64::max);
+            let clear = offers.iter().position(|(_, e)| e.saves == most && plain.is_cheap(e.build));
+            for (i, (method, expected)) in offers.into_iter().enumerate() {
+                if clear.is_some_and(|clear| clear != i) {
+                    continue;
+                }
                 if !plain.is_worth_trying(expected.build, expected.saves) {
                     let saves = expected.saves * plain.paths;
                     declined.push(Declined { method: method.name(), t_build: expected.build, saves });
@@ -198,17 +204,15 @@ impl Pilot<'_> {
         if self.progress.cancelled() { Err(RenderError::Cancelled) } else { Ok(seconds) }
     }
 
-    /// Follows paths without a method: their queries, and seconds that this takes.
-    fn record(&self, job: &Job<'_>, places: &[Place]) -> Result<(Vec<ShadowQuery>, f64), RenderError> {
+    /// Follows paths without a method: their queries.
+    fn record(&self, job: &Job<'_>, places: &[Place]) -> Result<Vec<ShadowQuery>, RenderError> {
         let log = Log::default();
         let tracer = job.recording_tracer(&log, self.progress);
         let mut counters = Counters::default();
-        let start = ThreadTime::now();
         for &(x, y, sample) in places {
             black_box(tracer.sample(x, y, sample, &mut counters));
         }
-        let seconds = start.seconds();
-        if self.progress.cancelled() { Err(RenderError::Cancelled) } else { Ok((log.0.into_inner(), seconds)) }
+        if self.progress.cancelled() { Err(RenderError::Cancelled) } else { Ok(log.0.into_inner()) }
     }
 
     /// What the queries of `paths` paths cost the hierarchy.
@@ -347,7 +351,8 @@ impl Recorder for Log {
     }
 }
 
-/// Paths all over the picture: at each place some neighbours, as a render follows them, and places that stay even however many there are.
+/// Paths all over the picture, which stay even however many there are. Several at one place would share the caches as those of a render do, but then there are fewer places,
+/// and what a path costs differs more from place to place.
 struct Places {
     crop: PixelRect,
     samples: u32,
@@ -356,22 +361,25 @@ struct Places {
 
 impl Places {
     fn new(job: &Job<'_>) -> Self {
-        Self { crop: job.crop(), samples: job.spp().min(SAMPLES), number: 0 }
+        Self { crop: job.crop(), samples: job.spp(), number: 0 }
     }
 
-    /// The next paths, `count` or a few more.
+    /// The next paths.
     fn next(&mut self, count: usize) -> Vec<Place> {
         let PixelRect { x0, y0, x1, y1 } = self.crop;
-        let mut paths = Vec::with_capacity(count + SAMPLES as usize);
-        while paths.len() < count {
-            let [u, v] = evenly([0.5, 0.5], self.number);
-            self.number += 1;
-            let pixels = (SAMPLES / self.samples).min(x1 - x0);
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of places")]
-            let at = |first: u32, places: u32, u: f64| first + (f64::from(places) * u) as u32;
-            let (x, y) = (at(x0, x1 - x0 - pixels + 1, u), at(y0, y1 - y0, v));
-            paths.extend((x..x + pixels).flat_map(|x| (0..self.samples).map(move |sample| (x, y, sample))));
-        }
-        paths
+        (0..count)
+            .map(|_| {
+                let [u, v] = evenly([0.5, 0.5], self.number);
+                let sample = self.number % self.samples.max(1);
+                self.number += 1;
+                #[allow(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "below the number of places"
+                )]
+                let at = |first: u32, end: u32, u: f64| first + (f64::from(end - first) * u) as u32;
+                (at(x0, x1, u), at(y0, y1, v), sample)
+            })
+            .collect()
     }
 }

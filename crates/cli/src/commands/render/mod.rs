@@ -56,14 +56,18 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     } else if options.noise.is_some() {
         options.spp = Some(options.spp.unwrap_or(NoiseLimit::MOST_SAMPLES));
     }
-    let method = match args.method {
-        Some(MethodChoice::One(method)) => Some(method),
-        Some(MethodChoice::Auto) => Some(Method::NONE),
+    let choice = match args.method {
+        Some(choice) => choice,
         // Proofs of flights need a field, whatever the lights.
-        None => args.segment_first.then(Method::best_with_voxels),
+        None if args.segment_first => MethodChoice::One(Method::best_with_voxels()),
+        None => MethodChoice::Auto,
+    };
+    let method = match choice {
+        MethodChoice::One(method) => method,
+        MethodChoice::Auto => Method::NONE,
     };
     let prepare = PrepareOptions {
-        method,
+        method: Some(method),
         voxel_size: args.voxel,
         grid: args.grid.into(),
         texels: args.light_buffer.and_then(|texels| texels.0),
@@ -87,11 +91,12 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     let Named { name, scene, .. } = named;
 
     let mut prepared = PreparedScene::new(scene, &prepare, reporter)?;
-    if args.method == Some(MethodChoice::Auto) {
+    if choice == MethodChoice::Auto {
         let work = work(args, &prepared, &options)?;
         prepared = prepared.with_best_method(&prepare, &options, work, reporter)?;
     }
-    if let Some(choice) = prepared.choice().filter(|_| !args.quiet) {
+    // Who did not ask finds it in the statistics.
+    if let Some(choice) = prepared.choice().filter(|_| !args.quiet && args.method.is_some()) {
         say(format_args!("note: method {}: {}", choice.method, choice.reason));
     }
     prepared.notes().iter().for_each(|note| say(format_args!("note: {note}")));
