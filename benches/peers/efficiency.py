@@ -7,7 +7,8 @@ For each scene both render --seeds pictures of --spp samples, in turns; scene fi
 its process around mi.render, after a first picture that compiles; for vdf user and system time of a process less that of one with a single sample, so that neither
 loads. What is compared is what a user gets: vdf with its defaults, one variant of Mitsuba. The noise is the mean over pixels and channels of the variance of the pictures over
 (mean² + 0.01 mean(mean)²), which needs no reference as neither is biased; the means are printed, too. The rows are medians of the times and the noise of all seeds. With few seeds the
-noise of a scene with fireflies (point lights in fog) is itself noisy: --trim leaves out that share of the pixels that are noisiest.
+noise of a scene with fireflies (point lights in fog) is itself noisy: --trim leaves out that share of the pixels that are noisiest. The last two columns are the same ratio for the mean squared
+error, of the pixels that are kept and of all: that of relative noise counts dark pixels as much as bright ones.
 """
 
 import argparse
@@ -65,14 +66,15 @@ def theirs(scene, seed, spp):
 def noise(images):
     images = np.stack(images)
     mean = images.mean(0)
-    relative = images.var(0, ddof=1) / (mean**2 + 0.01 * mean.mean() ** 2)
-    kept = np.sort(relative.mean(-1).ravel())
-    return kept[: max(1, round(len(kept) * (1 - args.trim)))].mean()
+    variance = images.var(0, ddof=1)
+    relative, squared = (np.sort(v.mean(-1).ravel()) for v in (variance / (mean**2 + 0.01 * mean.mean() ** 2), variance))
+    kept = max(1, round(len(relative) * (1 - args.trim)))
+    return np.array([relative[:kept].mean(), squared[:kept].mean(), squared.mean()])
 
 
 print(f"{args.size} x {args.size}, {args.spp} samples, {args.seeds} seeds, {args.variant}; vdf {args.vdf}\n")
-print("| scene | CPU s, Mitsuba | vdf | noise, Mitsuba | vdf | mean, vdf/Mitsuba | CPU s × noise, Mitsuba/vdf |")
-print("| --- | --- | --- | --- | --- | --- | --- |")
+print("| scene | CPU s, Mitsuba | vdf | noise, Mitsuba | vdf | mean, vdf/Mitsuba | CPU s × noise, Mitsuba/vdf | × squared error | of all pixels |")
+print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
 for path in args.scenes:
     scene = mi.load_file(path, **{name: args.size for name in args.film.split(",")})
     theirs(scene, 0, args.spp)
@@ -91,4 +93,4 @@ for path in args.scenes:
     ratio = np.mean(pictures["v"]) / np.mean(pictures["m"])
     nm, nv = noise(pictures["m"]), noise(pictures["v"])
     name = os.path.splitext(os.path.basename(path))[0]
-    print(f"| `{name}` | {m:.2f} | {v:.2f} | {nm:.3g} | {nv:.3g} | {ratio:.3f} | {m * nm / (v * nv):.1f} |", flush=True)
+    print(f"| `{name}` | {m:.2f} | {v:.2f} | {nm[0]:.3g} | {nv[0]:.3g} | {ratio:.3f} | {' | '.join(f'{x:.1f}' for x in m * nm / (v * nv))} |", flush=True)

@@ -64,7 +64,7 @@ fn method_by_default() {
         assert!(!outcome.stderr.contains("note: method"), "{}", outcome.stderr);
     }
     let outcome = text(&["cbox_light", "--segment-first"]);
-    assert!(outcome.stdout.contains("method         amr-xsn\n"), "{}", outcome.stdout);
+    assert!(outcome.stdout.contains("method         amr-xsn"), "{}", outcome.stdout);
     assert!(!outcome.stdout.contains("\nchosen "), "{}", outcome.stdout);
 }
 

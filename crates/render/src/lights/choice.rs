@@ -48,6 +48,21 @@ pub(super) struct Choice {
     near: Vec<usize>,
 }
 
+/// An emitter that is somewhere.
+#[derive(Clone, Copy, Debug)]
+struct Lamp {
+    emitter: usize,
+    bounds: Bounds,
+    intensity: f64,
+}
+
+impl Lamp {
+    /// Twice the middle of its box.
+    fn middle(&self) -> DVec3 {
+        self.bounds.min + self.bounds.max
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     middle: DVec3,
@@ -89,24 +104,27 @@ impl Choice {
     pub(super) fn new(shining: &[Shining]) -> Self {
         let (near, far): (Vec<_>, Vec<_>) = (0..shining.len()).partition(|&i| shining[i].is_some());
         let mut choice = Self { nodes: Vec::new(), leaves: vec![None; shining.len()], far, near };
-        let mut emitters: Vec<_> = shining.iter().enumerate().filter_map(|(i, s)| s.map(|(b, p)| (i, b, p))).collect();
-        if !emitters.is_empty() {
+        let lamp = |(emitter, shining): (usize, &Shining)| {
+            shining.map(|(bounds, intensity)| Lamp { emitter, bounds, intensity })
+        };
+        let mut lamps: Vec<_> = shining.iter().enumerate().filter_map(lamp).collect();
+        if !lamps.is_empty() {
             choice.nodes.push(Node::default());
-            choice.build(0, 0, &mut emitters);
+            choice.build(0, 0, &mut lamps);
         }
         choice
     }
 
-    /// Makes a node of these emitters, by medians.
-    fn build(&mut self, node: usize, parent: u32, emitters: &mut [(usize, Bounds, f64)]) {
-        let bounds = emitters.iter().fold(Bounds::EMPTY, |all, (_, bounds, _)| all.union(*bounds));
-        let mut groups: SmallVec<[&mut [(usize, Bounds, f64)]; WIDTH]> = SmallVec::new();
+    /// Makes a node of these lamps, by medians.
+    fn build(&mut self, node: usize, parent: u32, lamps: &mut [Lamp]) {
+        let bounds = lamps.iter().fold(Bounds::EMPTY, |all, lamp| all.union(lamp.bounds));
+        let mut groups: SmallVec<[&mut [Lamp]; WIDTH]> = SmallVec::new();
         let first = self.nodes.len();
-        let alone = if let [(emitter, ..)] = emitters { Some(*emitter) } else { None };
-        let intensity = emitters.iter().map(|(.., intensity)| intensity).sum();
-        groups.push(emitters);
+        let alone = if let [lamp] = lamps { Some(lamp.emitter) } else { None };
+        let intensity = lamps.iter().map(|lamp| lamp.intensity).sum();
+        groups.push(lamps);
         while groups.len() < WIDTH {
-            // The group with the most emitters is divided at the median of its longest side.
+            // The group with the most lamps is divided at the median of its longest side.
             let Some(i) = (0..groups.len()).max_by_key(|&i| groups[i].len()).filter(|&i| groups[i].len() > 1) else {
                 break;
             };
@@ -158,7 +176,8 @@ impl Choice {
                 left -= weights[i];
                 i += 1;
             }
-            u = (left / weights[i]).clamp(0.0, 1.0 - f64::EPSILON / 2.0);
+            // Rounding may come to a last one without weight, of which no share is left.
+            u = if weights[i] > 0.0 { (left / weights[i]).clamp(0.0, 1.0 - f64::EPSILON / 2.0) } else { 0.0 };
             share *= weights[i] / sum;
             node = &self.nodes[first + i];
         }
@@ -216,13 +235,12 @@ impl Default for Node {
     }
 }
 
-/// Two halves of several emitters, by the median along the longest side of their middles.
-fn halves(emitters: &mut [(usize, Bounds, f64)]) -> [&mut [(usize, Bounds, f64)]; 2] {
-    let middle = |bounds: &Bounds| bounds.min + bounds.max;
-    let spread = Bounds::of_points(emitters.iter().map(|(_, bounds, _)| middle(bounds))).extent();
+/// Two halves of several lamps, by the median along the longest side of their middles.
+fn halves(lamps: &mut [Lamp]) -> [&mut [Lamp]; 2] {
+    let spread = Bounds::of_points(lamps.iter().map(Lamp::middle)).extent();
     let axis = if spread.x >= spread.y.max(spread.z) { 0 } else { 1 + usize::from(spread.z > spread.y) };
-    emitters.sort_by(|(_, a, _), (_, b, _)| middle(a)[axis].total_cmp(&middle(b)[axis]));
-    let (low, high) = emitters.split_at_mut(emitters.len() / 2);
+    lamps.sort_by(|a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));
+    let (low, high) = lamps.split_at_mut(lamps.len() / 2);
     [low, high]
 }
 

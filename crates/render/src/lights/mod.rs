@@ -455,6 +455,8 @@ impl Light {
             Self::Directional { .. } | Self::Constant { .. } | Self::Envmap(_) => return None,
         };
         let area = if let Self::Area(light) = self { light.area() } else { 1.0 };
+        // What has no area is nowhere, and gives nothing.
+        let bounds = if bounds.is_empty() { Bounds::of_points([DVec3::ZERO]) } else { bounds };
         Some((bounds, self.intensity() * area))
     }
 

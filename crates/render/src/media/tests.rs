@@ -202,3 +202,17 @@ fn nobody_is_gone_for_good_where_something_may_come() {
     let behind = Boundary { triangles: cuboid(vec3(0.0, 0.0, 3.0), vec3(1.0, 1.0, 9.0), 0), ..alone.clone() };
     assert!(!Media::new(std::slice::from_ref(&fog), &[alone, behind], None).leaves_for_good(&segment, FOG, 2.0));
 }
+
+/// Fog without an end and without boundaries is everywhere; only where there is none either nothing is asked.
+#[test]
+fn fog_outside_of_all_boundaries_is_somewhere() {
+    let medium = Medium::new(0.5, Rgb::ONE, Phase::Isotropic);
+    let segment = Segment::new(DVec3::ZERO, dvec3(0.0, 6.0, 8.0));
+    for (ambient, tau) in [(Some(FOG), 5.0), (None, 0.0)] {
+        let media = Media::new(std::slice::from_ref(&medium), &[], ambient);
+        assert_eq!(media.optical_depth(&segment, &RegionSet::default()), tau);
+        let flight = media.free_flight(&segment, &RegionSet::default(), 1.0);
+        assert_eq!(matches!(flight, FreeFlight::Collision { t, .. } if t == 0.2), tau > 0.0, "{flight:?}");
+        assert_eq!(media.are_nowhere(), tau == 0.0);
+    }
+}
