@@ -100,12 +100,15 @@ def main():
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         embree = Embree(arguments.out)
         rounds = [(embree.round(), vdf_round(arguments.vdf, scene, arguments.method, arguments.out)) for _ in range(arguments.rounds)]
-        for kind in embree.classes:
-            median = lambda which, name: statistics.median(r[which][kind][name] for r in rounds)
+        counts = {kind: rounds[0][0][kind]["queries"] for kind in embree.classes}
+        for kind, parts in [*((k, [k]) for k in counts), *([("all", list(counts))] if len(counts) > 1 else [])]:
+            n = sum(counts[part] for part in parts)
+            # Of all queries by their numbers, round by round.
+            median = lambda which, name: statistics.median(sum(r[which][part][name] * counts[part] for part in parts) / n for r in rounds)
             peer, hierarchy, single, batch = median(0, "ns"), median(1, "hierarchy"), median(1, "single"), median(1, "batch")
+            differ = sum(rounds[0][0][part]["differ"] for part in parts)
             print(f"| {text}, {kind} | {100 * median(1, 'u'):.2f} | {peer:.1f} | {hierarchy:.1f} | {single:.1f} | {batch:.1f} "
-                  f"| {peer / hierarchy:.2f} | {peer / single:.2f} | {peer / batch:.2f} | {rounds[0][0][kind]['differ']} |", flush=True)
-
+                  f"| {peer / hierarchy:.2f} | {peer / single:.2f} | {peer / batch:.2f} | {differ} |", flush=True)
 
 if __name__ == "__main__":
     main()
