@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Removes the guards of `mutations.toml` one by one in a copy of the repository, and requires that a test fails each time.
 
-    python3 tests/mutations/run.py                        # all 297
+    python3 tests/mutations/run.py                        # all 298
     python3 tests/mutations/run.py --only dilation        # those whose name begins with a word; several words may follow
     python3 tests/mutations/run.py --check                # only: is every text to be replaced still there, once?
 

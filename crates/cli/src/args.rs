@@ -61,7 +61,7 @@ pub(crate) struct RenderArgs {
     #[arg(short, long, value_name = "OUT.exr")]
     pub(crate) output: Option<PathBuf>,
     /// Acceleration of visibility queries; the image is the same with all. "auto" follows some paths first, a hundredth of the render, and takes what renders this many
-    /// samples soonest: no method, xsn or lb [default: auto, or amr-xsn with --segment-first]
+    /// samples soonest: no method, xsn or lb [default: auto; with --segment-first amr-xsn; where an --aov depends on it lb, or amr-xsn beyond 10,000 triangles]
     #[arg(long, value_name = "METHOD", value_parser = method_choice_parser())]
     pub(crate) method: Option<MethodChoice>,
     /// Texels along each side of a face of a light buffer (method lb), rounded up to a power of two [default: auto, about

@@ -63,6 +63,10 @@ fn method_by_default() {
         assert!(outcome.stdout.contains("\nchosen         "), "{}", outcome.stdout);
         assert!(!outcome.stderr.contains("note: method"), "{}", outcome.stderr);
     }
+    // What layers show does not hang on a clock.
+    let outcome = text(&["cbox_vol2", "--aov", "unknown"]);
+    assert!(outcome.stdout.contains("method         lb"), "{}", outcome.stdout);
+    assert!(!outcome.stdout.contains("\nchosen "), "{}", outcome.stdout);
     let outcome = text(&["cbox_light", "--segment-first"]);
     assert!(outcome.stdout.contains("method         amr-xsn"), "{}", outcome.stdout);
     assert!(!outcome.stdout.contains("\nchosen "), "{}", outcome.stdout);

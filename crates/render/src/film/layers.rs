@@ -121,7 +121,8 @@ impl Layers {
     }
 
     /// Whether one of them depends on the method.
-    pub(crate) const fn depend_on_method(self) -> bool {
+    #[must_use]
+    pub const fn depend_on_method(self) -> bool {
         self.contains(Layer::Cost) || self.contains(Layer::Unknown)
     }
 

@@ -57,17 +57,19 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
         options.spp = Some(options.spp.unwrap_or(NoiseLimit::MOST_SAMPLES));
     }
     let choice = match args.method {
-        Some(choice) => choice,
+        Some(choice) => Some(choice),
         // Proofs of flights need a field, whatever the lights.
-        None if args.segment_first => MethodChoice::One(Method::best_with_voxels()),
-        None => MethodChoice::Auto,
+        None if args.segment_first => Some(MethodChoice::One(Method::best_with_voxels())),
+        // What a layer shows must not hang on a clock: then the library's rule.
+        None if options.layers.depend_on_method() => None,
+        None => Some(MethodChoice::Auto),
     };
-    let method = match choice {
+    let method = choice.map(|choice| match choice {
         MethodChoice::One(method) => method,
         MethodChoice::Auto => Method::NONE,
-    };
+    });
     let prepare = PrepareOptions {
-        method: Some(method),
+        method,
         voxel_size: args.voxel,
         grid: args.grid.into(),
         texels: args.light_buffer.and_then(|texels| texels.0),
@@ -91,7 +93,7 @@ fn render(args: &RenderArgs, reporter: &Reporter, asked: &AtomicBool) -> Result<
     let Named { name, scene, .. } = named;
 
     let mut prepared = PreparedScene::new(scene, &prepare, reporter)?;
-    if choice == MethodChoice::Auto {
+    if choice == Some(MethodChoice::Auto) {
         let work = work(args, &prepared, &options)?;
         prepared = prepared.with_best_method(&prepare, &options, work, reporter)?;
     }
