@@ -46,6 +46,15 @@ fn scene(reflectance: f32, albedo: f32, density: f64) -> Scene {
     scene
 }
 
+/// The mean of the differences of two renders over the pixels that are kept, and its standard error.
+fn difference(a: &[Rgb], b: &[Rgb], keep: impl Fn(usize) -> bool) -> [f64; 2] {
+    let kept = a.iter().zip(b).enumerate().filter(|(i, _)| keep(*i));
+    let differences: Vec<f64> = kept.map(|(_, (a, b))| f64::from(a.x - b.x)).collect();
+    let n = differences.len() as f64;
+    let mean = differences.iter().sum::<f64>() / n;
+    [mean, (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt()]
+}
+
 /// The mean over the image of the difference of two independent renders: 5 standard errors are a false alarm of 6·10⁻⁷.
 #[test]
 fn the_integrators_agree_where_their_models_do() {
@@ -66,11 +75,8 @@ fn the_integrators_agree_where_their_models_do() {
         let by_need = Estimator::ALL.map(|e| (auto, e, SamplerKind::Independent));
         for (integrator, estimator, sampler) in all.chain(by_need) {
             let marched = image(integrator, estimator, sampler, 64, 2);
-            let n = traced.len() as f64;
-            let differences: Vec<f64> = traced.iter().zip(&marched).map(|(a, b)| f64::from(a.x - b.x)).collect();
-            let mean = differences.iter().sum::<f64>() / n;
-            let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
-            let level = traced.iter().map(|p| f64::from(p.x)).sum::<f64>() / n;
+            let [mean, error] = difference(&traced, &marched, |_| true);
+            let level = traced.iter().map(|p| f64::from(p.x)).sum::<f64>() / traced.len() as f64;
             println!(
                 "{name}, {integrator}, {estimator:?}, {sampler:?}: volpath − raymarch = {:.1e} ± {:.1e} of the mean",
                 mean / level,
@@ -100,11 +106,7 @@ fn the_estimators_of_paths_agree() {
             let level = thesis.iter().map(|p| f64::from(p.x)).sum::<f64>() / thesis.len() as f64;
             for (part, keep) in [0, 1, 2, 3, 4].map(|q| (q, move |i: usize| q == 4 || (i % 32 / 16 + i / 512 * 2) == q))
             {
-                let pairs = thesis.iter().zip(&other).enumerate().filter(|(i, _)| keep(*i));
-                let differences: Vec<f64> = pairs.map(|(_, (a, b))| f64::from(a.x - b.x)).collect();
-                let n = differences.len() as f64;
-                let mean = differences.iter().sum::<f64>() / n;
-                let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+                let [mean, error] = difference(&thesis, &other, keep);
                 println!("rr {rr_depth}, {sampler:?}, part {part}: {:.1e} ± {:.1e}", mean / level, error / level);
                 assert!(mean.abs() < 5.0 * error, "{sampler:?}, part {part}: {mean} ± {error}");
                 assert!(error < 6e-3 * level, "{sampler:?}, part {part}: too noisy, {error} of {level}");
@@ -138,11 +140,7 @@ fn lit_parts_of_rays_agree_with_queries() {
     for (samples, sampler) in [(1, SamplerKind::Sobol), (1, SamplerKind::Independent), (6, SamplerKind::Independent)] {
         let lit = image(Estimator::Lit, sampler, samples, 128, 2);
         for part in 0..5 {
-            let kept = asked.iter().zip(&lit).enumerate().filter(|(i, _)| part == 4 || i * 4 / asked.len() == part);
-            let differences: Vec<f64> = kept.map(|(_, (a, b))| f64::from(a.x - b.x)).collect();
-            let n = differences.len() as f64;
-            let mean = differences.iter().sum::<f64>() / n;
-            let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+            let [mean, error] = difference(&asked, &lit, |i| part == 4 || i * 4 / asked.len() == part);
             println!("{samples} samples, {sampler:?}, part {part}: {:.1e} ± {:.1e}", mean / level, error / level);
             assert!(mean.abs() < 5.0 * error, "{samples} samples, {sampler:?}, part {part}: {mean} ± {error}");
             // A quarter of the image is twice as noisy as all of it.
@@ -181,12 +179,7 @@ fn lamps_may_be_asked_by_what_they_give() {
             }
             let other = image(Estimator::Equiangular, light_paths, 256, 2);
             for part in 0..5 {
-                let kept =
-                    thesis.iter().zip(&other).enumerate().filter(|(i, _)| part == 4 || i * 4 / thesis.len() == part);
-                let differences: Vec<f64> = kept.map(|(_, (a, b))| f64::from(a.x - b.x)).collect();
-                let n = differences.len() as f64;
-                let mean = differences.iter().sum::<f64>() / n;
-                let error = (differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+                let [mean, error] = difference(&thesis, &other, |i| part == 4 || i * 4 / thesis.len() == part);
                 println!("{integrator:?}, {light_paths:?}, part {part}: {:.1e} ± {:.1e}", mean / level, error / level);
                 assert!(mean.abs() < 5.0 * error, "{integrator:?}, {light_paths:?}, part {part}: {mean} ± {error}");
                 assert!(

@@ -4,15 +4,15 @@
 //! β(1 − T) of such rays, T their transmittance, ends in a collision whose distance is drawn by its angle at the light
 //! (`equiangular`); the others fly freely. The density of a collision is that of the mixture, so its weight is at most
 //! 1/(1 − β); a ray that arrives at its end is worth 1/(1 − β(1 − T)). Rays that come no nearer fly freely: r² hardly changes along
-//! their flights. Next-event estimation asks for the same emitter, whether the ray collides or arrives. Area lights have no such peak, and gained
+//! their flights. Of several emitters any may be the one; the event asks another, that can give it much (`lights/choice.rs`). Area lights have no such peak, and gained
 //! nothing (`performance.md`).
 //!
 //! *Light paths.* Every event is connected to the first event of a ray from a light (`bounce.rs`).
 //!
 //! *The last ray* of a path that may not scatter again flies nowhere: it arrives, and is worth its transmittance. Where no ray can meet a light it is not cast.
 //!
-//! *Why it is unbiased.* The mixture is a one-sample estimate with the balance heuristic \[Veach1997\], given emitter and place, which are drawn before
-//! and independently.
+//! *Why it is unbiased.* The mixture is a one-sample estimate with the balance heuristic \[Veach1997\], given the emitter that the distance is drawn towards, which is drawn before
+//! and independently. The only emitter's place is drawn then, too, and serves the event as well.
 //!
 //! *Cost.* A ray that passes near a light is cast to its end, where `thesis` casts only as far as it flies.
 
@@ -64,7 +64,7 @@ impl<R: Recorder> Tracer<'_, R> {
             let place = if lights.count() == 1 { self.draw_place(0, sampler) } else { None };
             let towards = chosen.and_then(|(emitter, _)| lights.point_position(emitter));
             let towards = towards.map(|position| LightPlace { position, normal: None });
-            let near = |light: &LightPlace| light.passed_at(origin, direction) < near_enough;
+            let near = |light: &LightPlace| !media.are_nowhere() && light.passed_at(origin, direction) < near_enough;
             let event = match towards.filter(near) {
                 _ if is_last => self.arrival(&mut path, counters),
                 Some(light) => self.event_near_light(&mut path, &light, u, counters),

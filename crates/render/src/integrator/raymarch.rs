@@ -4,9 +4,9 @@
 //! light only; surfaces scatter any number of times. With T the transmittance of the ray, the k-th of n samples lies at the optical
 //! depth −ln(1 − (k + ξ)(1 − T)/n) and is worth albedo·(1 − T)/n.
 //!
-//! That is the estimator `thesis`. `equiangular` draws distances by their angle at a light, too (`equiangular`). The emitter is drawn first, with
-//! a place on it; then the distance, with a share of ¾ towards that place and else in proportion to transmittance; the one is weighted
-//! against the other by the balance heuristic in its one-sample form \[Veach1997\], with the density of the mixture. So a sample is never
+//! That is the estimator `thesis`. `equiangular` draws distances by their angle at a light, too (`equiangular`). The emitter is drawn first, by what it can give to
+//! the ray (`lights/choice.rs`), with a place on it; then the distance, with a share of ¾ towards that place and else in proportion to transmittance; the one is weighted
+//! against the other by the balance heuristic in its one-sample form \[Veach1997\], with the density of the mixture. So a sample of one emitter is never
 //! worth more than four times what it is by transmittance alone, in fog of any thickness, with a light in any place. One number in (k + ξ)/n
 //! makes all these choices, so that each of them is stratified.
 //!
