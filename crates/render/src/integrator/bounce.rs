@@ -260,10 +260,7 @@ mod tests {
     use vdf_scene::{LoadOptions, Scene};
 
     use super::*;
-    use crate::{
-        Estimator, PrepareOptions, PreparedScene, Quiet, Roulette, SamplerKind, TransmittanceEstimator,
-        integrator::Connected,
-    };
+    use crate::{PrepareOptions, PreparedScene, Quiet, SamplerKind};
 
     /// As many numbers are passed over as are drawn, from a point and from an area, whatever becomes of the light path.
     #[test]
@@ -272,17 +269,7 @@ mod tests {
             let source = vdf_scenes::builtin(name).expect("a built-in scene");
             let scene = Scene::from_source(&source, &LoadOptions::default()).expect("it loads");
             let prepared = PreparedScene::new(scene, &PrepareOptions::default(), &Quiet).expect("it is prepared");
-            let tracer = Tracer {
-                light_paths: Connected::Always,
-                world: prepared.world(),
-                visibility: prepared.visibility(),
-                settings: prepared.scene().integrator,
-                transmittance: TransmittanceEstimator::Analytic,
-                roulette: Roulette::default(),
-                estimator: Estimator::Equiangular,
-                arch: Arch::new(),
-                progress: &Quiet,
-            };
+            let tracer = Tracer::of(&prepared, Connected::Always, Arch::new());
             assert_eq!(tracer.numbers_of_bounce(), numbers);
             for i in 0..200 {
                 let mut drawn = Sampler::of_kind(SamplerKind::Sobol, 1, i, 0, i);

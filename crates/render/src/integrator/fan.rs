@@ -255,11 +255,11 @@ mod tests {
     use glam::dvec3;
     use pulp::Arch;
     use vdf_scene::{Emitter, LoadOptions, Scene};
-    use vdf_visibility::{Method, NoRecorder};
+    use vdf_visibility::Method;
 
     use super::*;
     use crate::{
-        Estimator, PrepareOptions, PreparedScene, Quiet, Roulette, SamplerKind,
+        Estimator, PrepareOptions, PreparedScene, Quiet, SamplerKind,
         integrator::{Connected, stretch::stretches},
     };
 
@@ -270,20 +270,6 @@ mod tests {
         let point = |&position: &DVec3| Emitter::Point { position, intensity: Rgb::new(1e5, 2e4, 0.0) };
         scene.emitters.extend(lights.iter().map(point));
         scene
-    }
-
-    fn tracer(prepared: &PreparedScene, arch: Arch) -> Tracer<'_, NoRecorder> {
-        Tracer {
-            light_paths: Connected::Never,
-            world: prepared.world(),
-            visibility: prepared.visibility(),
-            settings: prepared.scene().integrator,
-            transmittance: TransmittanceEstimator::Analytic,
-            roulette: Roulette::default(),
-            estimator: Estimator::Equiangular,
-            arch,
-            progress: &Quiet,
-        }
     }
 
     /// A ray from anywhere in or about the box: along its faces, out of it, at a light, along an axis, of no length.
@@ -330,7 +316,7 @@ mod tests {
             let light = world.lights.points()[0].1;
             let fog_bounds = world.clear.expect("one box, with all lights in it");
             for arch in [Arch::new(), Arch::Scalar] {
-                let mut tracer = tracer(&prepared, arch);
+                let mut tracer = Tracer::of(&prepared, Connected::Never, arch);
                 for i in 0..1500 {
                     let sampler = &mut Sampler::new(17, i, 0, 0);
                     let free = ray(&fog_bounds, light, sampler);
@@ -384,7 +370,7 @@ mod tests {
         scene.boundaries.push(boundary);
         let prepared =
             PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).expect("it is prepared");
-        let (world, tracer) = (prepared.world(), tracer(&prepared, Arch::new()));
+        let (world, tracer) = (prepared.world(), Tracer::of(&prepared, Connected::Never, Arch::new()));
         let free = Segment::new(dvec3(400.0, 100.0, 100.0), dvec3(450.0, 400.0, 300.0));
         let intervals = world.media.intervals(&free, &world.media.regions_at(free.p));
         let (tau, direction) = (intervals.optical_depth(), (free.q - free.p).normalize());
@@ -411,7 +397,7 @@ mod tests {
         scene.boundaries.push(hole);
         let prepared =
             PreparedScene::new(scene, &PrepareOptions::with_method(Method::NONE), &Quiet).expect("it is prepared");
-        let (world, tracer) = (prepared.world(), tracer(&prepared, Arch::new()));
+        let (world, tracer) = (prepared.world(), Tracer::of(&prepared, Connected::Never, Arch::new()));
         let clear = world.clear.expect("the hole");
         let mut crossed = 0;
         for i in 0..4000 {

@@ -43,6 +43,8 @@ impl<R: Recorder> Tracer<'_, R> {
     /// Radiance along `ray` by volumetric path tracing with mixtures and light paths.
     pub(crate) fn volpath_by_mixture(&self, ray: PathRay, sampler: &mut Sampler, counters: &mut Counters) -> Rgb {
         let (media, lights) = (&self.world.media, &self.world.lights);
+        // Without media no distance is drawn.
+        let nowhere = media.are_nowhere();
         let near_enough = media.least_sigma_t().recip().min(NEAR * self.world.bounds.extent().length());
         let mut path = Path::new(ray);
         path.light_path = match self.light_paths {
@@ -64,12 +66,11 @@ impl<R: Recorder> Tracer<'_, R> {
             let place = if lights.count() == 1 { self.draw_place(0, sampler) } else { None };
             let towards = chosen.and_then(|(emitter, _)| lights.point_position(emitter));
             let towards = towards.map(|position| LightPlace { position, normal: None });
-            let near = |light: &LightPlace| !media.are_nowhere() && light.passed_at(origin, direction) < near_enough;
+            let near = |light: &LightPlace| !nowhere && light.passed_at(origin, direction) < near_enough;
             let event = match towards.filter(near) {
                 _ if is_last => self.arrival(&mut path, counters),
                 Some(light) => self.event_near_light(&mut path, &light, u, counters),
-                // Nothing depends on it where nothing is.
-                None if media.are_nowhere() => self.first_event(&mut path, f64::INFINITY, counters),
+                None if nowhere => self.first_event(&mut path, f64::INFINITY, counters),
                 None => self.first_event(&mut path, -(-u).ln_1p(), counters),
             };
             let (vertex, point, regions) = match event {

@@ -593,3 +593,21 @@ fn survives(path: &mut Path, roulette: Roulette, rr_depth: u32, sampler: &mut Sa
     path.throughput /= q;
     true
 }
+
+#[cfg(test)]
+impl<'a> Tracer<'a, vdf_visibility::NoRecorder> {
+    /// For tests: who follows the paths of a scene by default, but for light paths.
+    fn of(prepared: &'a crate::PreparedScene, light_paths: Connected, arch: Arch) -> Self {
+        Self {
+            light_paths,
+            world: prepared.world(),
+            visibility: prepared.visibility(),
+            settings: prepared.scene().integrator,
+            transmittance: TransmittanceEstimator::Analytic,
+            roulette: Roulette::default(),
+            estimator: Estimator::Equiangular,
+            arch,
+            progress: &crate::Quiet,
+        }
+    }
+}
